@@ -1,8 +1,8 @@
-"""What a monitor does with answers: which messages are parts of one, and those that wait for their inputs (`pairing`).
+"""How a monitor handles answers: which messages are parts of one, and those that wait for their inputs (`pairing`).
 
-Of one whose outputs come on several topics, by stamp, key and call those are parts that have it in common; by order the
-k-th of each output; by latency those that came within it. By arrival an answer is whole when each output has come since
-the last one. One that cannot be read takes its place.
+The outputs of an answer on several topics are its parts: by stamp, key and call those that share it; by order the k-th
+of each output; by latency those that came within it. By arrival an answer is complete when each output has come since
+the last one. An unreadable answer keeps its place.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ if TYPE_CHECKING:
 def came(
     monitor: Monitor, watched: Watched, names: Mapping[str, bool], event: Mapping[str, Any], found: list[Violation]
 ) -> Iterator[Answer | None]:
-    """The answers of a clause that are whole now that some of its outputs have come (whether each could be read): of
-    one whose parts may have come apart, they; else None."""
+    """The answers of a clause that are complete now that some of its outputs have come (whether each could be read): an
+    Answer if its parts may have come apart, otherwise None."""
     tally = watched.tally
     if len(watched.outputs) == 1:
         tally.published += 1
@@ -74,7 +74,7 @@ def scatter(clauses: Iterable[Watched]) -> None:
 
 
 def finish(monitor: Monitor, watched: Watched, found: list[Violation]) -> str:
-    """The run is over: what never was whole is judged. Why the parts need not have been told rightly, if so."""
+    """The run is over: judge incomplete answers. Returns why parts may have been matched wrongly, if so."""
     while watched.fresh:
         monitor.judge_part(watched, watched.fresh.pop(next(iter(watched.fresh))), {}, found)
     if len(set(watched.counted.values())) < 2 and watched.counted.keys() in (set(), watched.outputs):
@@ -86,7 +86,7 @@ def finish(monitor: Monitor, watched: Watched, found: list[Violation]) -> str:
 def judge_part(
     monitor: Monitor, watched: Watched, parts: Mapping[str, Part], event: Mapping[str, Any], found: list[Violation]
 ) -> None:
-    """Judge what is known of an answer that never was whole: it is decided where the rest does not matter."""
+    """Judge the known part of an answer that was never complete: it is decided if the rest does not matter."""
     tally = watched.tally
     monitor.lose(watched)
     _count(monitor, watched, max(part.time for part in parts.values()))
@@ -108,7 +108,7 @@ def judge_part(
 
 
 def _count(monitor: Monitor, watched: Watched, time: Fraction) -> None:
-    """An answer that is not held against inputs counts among the answers."""
+    """Count an answer that is not paired with inputs."""
     if monitor.pairing is not None:
         monitor.pairing.count(watched, ticks(time))
 
@@ -127,7 +127,7 @@ def _key(monitor: Monitor, watched: Watched, name: str, event: Mapping[str, Any]
 
 
 def _leave(monitor: Monitor, watched: Watched, event: Mapping[str, Any], found: list[Violation]) -> None:
-    """By latency, parts that are too old to be of the answer that comes."""
+    """By latency, judge parts that are too old to be of the answer that comes."""
     parts, pairing = watched.fresh.get(None), monitor.pairing
     if not parts or pairing is None or pairing.answers.by != "latency":
         return
@@ -137,7 +137,7 @@ def _leave(monitor: Monitor, watched: Watched, event: Mapping[str, Any], found: 
 
 
 def _known(monitor: Monitor, watched: Watched, name: str) -> dict[str, Value]:
-    """One output, and all that is known but the other outputs of the answer."""
+    """One output, and all known values except the other outputs of the answer."""
     values = {**monitor.values, **watched.memory}
     held = {n for n, _ in watched.held}
     paired = monitor.paired if monitor.pairing is not None else frozenset()
@@ -160,7 +160,7 @@ def _open(monitor: Monitor, watched: Watched, values: Mapping[str, Value]) -> bo
 
 
 def own(monitor: Monitor, readers: list[tuple[str, Reader]], event: Mapping[str, Any]) -> list[tuple[str, Reader]]:
-    """Those of variables that a message carries, whoever else publishes its topic."""
+    """The readers of variables whose message is the node's own, if other nodes publish its topic too."""
     unknown = [name for name, _ in readers if monitor.setup.whose(name, event) is None]
     for watched in monitor.about(unknown):
         watched.tally.unnamed(str(event["topic"]))
@@ -169,8 +169,8 @@ def own(monitor: Monitor, readers: list[tuple[str, Reader]], event: Mapping[str,
 
 
 def speaks(monitor: Monitor, watched: Watched) -> tuple[str, ...]:
-    """What the verdict on an answer depends on, but for the inputs that it is paired with: first what the clause speaks
-    of, then the assumptions."""
+    """The variables that the verdict on an answer depends on, except the inputs that it is paired with: first those of
+    the clause, then those of the assumptions."""
     return tuple(dict.fromkeys(n for n in (*watched.names, *monitor.assumed) if n not in monitor.paired))
 
 
@@ -180,8 +180,8 @@ def asks(monitor: Monitor, watched: Watched) -> tuple[str, ...]:
 
 
 def judges_answers_alone(monitor: Monitor, watched: Watched) -> bool:
-    """Whether a clause is about outputs alone, of a node that assumes something of its inputs: where it is broken,
-    whose fault that is hangs on what the answer answered."""
+    """Whether a clause is about outputs alone, of a node with assumptions on its inputs: if it is broken, the node at
+    fault depends on what the answer answered."""
     alone = monitor.pairing is not None and watched.outputs and not watched.paired
     return bool(alone) and not monitor.paired.isdisjoint(monitor.assumed)
 
@@ -193,7 +193,7 @@ def saw(monitor: Monitor, pairing: Pairing, name: str, event: Mapping[str, Any],
 
 
 def accused(monitor: Monitor, watched: Watched, values: Mapping[str, Value], event: Mapping[str, Any]) -> bool:
-    """Whether such a clause is broken."""
+    """Whether such a clause is broken (`judges_answers_alone`)."""
     if monitor.pairing is None or not judges_answers_alone(monitor, watched):
         return False
     known = all(name in values and name not in monitor.supposed for name in watched.names)
@@ -206,7 +206,7 @@ def accused(monitor: Monitor, watched: Watched, values: Mapping[str, Value], eve
 def ask(
     monitor: Monitor, watched: Watched, values: Mapping[str, Value], answer: Answer | None, event: Mapping[str, Any]
 ) -> None:
-    """An answer, which will be judged once it is known what it may have answered."""
+    """An answer, which is judged once the inputs that it may have answered are known."""
     assert monitor.pairing is not None
     pairing, now = monitor.pairing, time_of(event)
     missing = [n for n in watched.names if n not in monitor.paired and (n not in values or n in monitor.supposed)]
@@ -223,7 +223,7 @@ def ask(
 
 
 def judge_answer(monitor: Monitor, asked: Asked, choices: Choices, found: list[Violation]) -> None:
-    """An answer's inputs are known, or why they are not."""
+    """Judge an answer whose inputs are known, or cannot be."""
     pairing = monitor.kept
     assert pairing is not None
     watched, tally = asked.watched, asked.watched.tally
@@ -258,8 +258,8 @@ DEPENDS = "it depends on which of its inputs the answer answered"
 
 
 def doubtful(monitor: Monitor, watched: Watched) -> bool:
-    """By order: whether a verdict on a clause may be of messages that do not belong together, which shows only once the
-    run is over and there were not as many of both."""
+    """By order: whether a verdict on a clause may be about messages that do not belong together, which is known only at
+    the end of the run, if their numbers differ."""
     setup, spoken = monitor.setup, {*watched.names}
     if setup.answers is None or setup.answers.by != "order":
         return False
@@ -269,7 +269,7 @@ def doubtful(monitor: Monitor, watched: Watched) -> bool:
 
 
 def sure(monitor: Monitor, found: list[Violation], *, over: bool = False) -> list[Violation]:
-    """What may be told now; breaches that are in doubt wait for the end of the run."""
+    """The violations that may be reported now; breaches in doubt wait for the end of the run."""
     if not found or not monitor.by_order or (monitor.prompt and not over):
         return found
     told: list[Violation] = []
@@ -285,8 +285,8 @@ def sure(monitor: Monitor, found: list[Violation], *, over: bool = False) -> lis
 
 
 def withdraw(monitor: Monitor, found: list[Violation]) -> list[Violation]:
-    """There were not as many of both: what was judged of messages by their order is undecided, but where the messages'
-    numbers say which were lost: since then, nothing was judged."""
+    """The numbers of messages differ: verdicts on messages paired by order are undecided, unless the messages' numbers
+    show which were lost: since then, nothing was judged."""
     if monitor.exact is not None and monitor.exact.lost and len(_sent(monitor)) == 1:
         return found
     for watched in monitor.by_order.values():
@@ -299,7 +299,7 @@ def withdraw(monitor: Monitor, found: list[Violation]) -> list[Violation]:
 
 
 def _sent(monitor: Monitor) -> set[int]:
-    """How many messages each topic of such clauses had, with those that were lost by their numbers."""
+    """The number of messages that each topic of such clauses had, including those lost according to their numbers."""
     if monitor.word is not None:
         counts = set(monitor.word.counts.items())
     else:

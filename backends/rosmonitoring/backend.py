@@ -30,7 +30,7 @@ _TRIAL = """from rosbags.typesys import Stores, get_typestore
 get_typestore(Stores.ROS2_HUMBLE).deserialize_cdr(b"\\0\\1\\0\\0\\2\\0\\0\\0x\\0", "std_msgs/msg/String")"""
 
 _OPTIONS = json.loads(read_text(Path(__file__).with_name("options.json"), "utf-8"))
-"""The options of this backend alone; what is described and no more is a duration."""
+"""The options of this backend alone; an option with a description only is a duration."""
 _OPTIONS["fresh"]["additionalProperties"] = DURATION
 _DURATIONS = {name: {**DURATION, **option} for name, option in _OPTIONS.items() if option.keys() == {"description"}}
 SCHEMA = schema({**_OPTIONS, **_DURATIONS, **READING})

@@ -1,5 +1,4 @@
-"""Some events of a trace by topic: their fields as arrays where the trace has them so, an event only where it is asked
-for."""
+"""Some events of a trace by topic: their fields as arrays if the trace has them so, an event only on request."""
 
 from __future__ import annotations
 
@@ -50,7 +49,7 @@ class Batch:
     times: Floats
     _arrays: Mapping[str, Callable[[FieldPath], Array | None]] = field(default_factory=dict)
     nanoseconds: Ints | None = None
-    """The times, if they are known so."""
+    """The times in nanoseconds, if they are known so."""
     rows: dict[str, Ints] = field(default_factory=dict)
     """Topic, without its leading slash → its rows."""
     backwards: bool = False
@@ -66,7 +65,7 @@ class Batch:
         return [self.event(row) for row in rows.tolist()]
 
     def numbered(self, topic: str) -> bool:
-        """Whether a topic's messages may have numbers that are no array."""
+        """Whether a topic's messages may have sequence numbers that are in no array."""
         return topic not in self._arrays and any("header" in event for event in self.of(self.rows[topic]))
 
     def array(self, topic: str, path: FieldPath) -> Array | None:
@@ -75,14 +74,14 @@ class Batch:
         return None if arrays is None or not path or path[0] in ENVELOPE else arrays(path)
 
     def keys(self, topic: str, path: FieldPath) -> Sequence[Hashable]:
-        """What a field holds in each of a topic's messages: equal keys, equal values."""
+        """The content of a field in each of a topic's messages: equal keys mean equal values."""
         found, array = self._keys.get((topic, path)), self.array(topic, path)
         if found is None and array is not None:
             found = self._keys[topic, path] = array.tolist()
         if found is None:
             events = self.of(self.rows[topic])
             if len(path) == 1 and isinstance(name := path[0], str) and name not in ENVELOPE:
-                found = [event.get(name, _MISSING) for event in events]  # as nearly always
+                found = [event.get(name, _MISSING) for event in events]  # the usual case
             if found is None or not set(map(type, found)) <= {*_PLAIN}:
                 found = [_key(event, path) for event in events]
             self._keys[topic, path] = found
@@ -101,7 +100,7 @@ def _key(event: Event, path: FieldPath) -> Hashable:
 
 
 def key_of(raw: Any) -> Hashable:
-    # True is 1 for a dictionary, no list is a key, and NaN is not itself
+    # True equals 1 as a dictionary key, no list is a key, and NaN does not equal itself
     return raw if raw is None or (raw.__class__ in _PLAIN and raw == raw) else repr(raw).encode()
 
 
@@ -116,7 +115,7 @@ def of_events(events: Sequence[Event], lines: Sequence[int]) -> Batch:
 
 
 def of_messages(messages: Iterable[tuple[Channel, int, bytes]]) -> Iterator[Batch]:
-    """The messages of a bag, so many at a time."""
+    """The messages of a bag, in batches."""
     layouts: dict[int, Layout | None] = {}
     channels: list[Channel] = []
     times: list[int] = []
@@ -150,25 +149,25 @@ def _of_messages(
         if said[same_topic(topic)] == 1 and (columns := _columns(channels[rows[0]], some, layouts)):
             arrays[same_topic(topic)] = columns
     event = cache(lambda row: channels[row].event(times[row], raws[row]))
-    seconds = np.array([time / 10**9 for time in times])  # nearest to what the event says
+    seconds = np.array([time / 10**9 for time in times])  # nearest to the event's time
     return Batch(event, range(line, line + len(raws)), written, times, seconds, arrays, np.array(times, np.int64))
 
 
 def _columns(
     channel: Channel, raws: Sequence[bytes], layouts: dict[int, Layout | None]
 ) -> Callable[[FieldPath], Array | None] | None:
-    """The fields of one channel's messages, by the layout of those before or of the first of these."""
+    """The fields of one channel's messages, by the layout of earlier ones or of the first of these."""
     known = layouts.get(id(channel))
     columns = None if known is None else known.columns(raws)
     if columns is None:
-        channel.read(raws[0])  # raises for what is no message
+        channel.read(raws[0])  # raises if it is no message
         known = layouts[id(channel)] = channel.layout(raws[0])
         columns = None if known is None else known.columns(raws)
     return columns
 
 
 def of_arrays(topics: Mapping[str, Mapping[str, Array]]) -> Iterator[Batch]:
-    """Arrays: topic → field (`pose.x`; `time` in seconds) → a number a message."""
+    """Arrays: topic → field (`pose.x`; `time` in seconds) → one number for each message."""
     parts = [np.asarray(fields["time"], np.float64) for fields in topics.values()]
     times, several = np.concatenate(parts), len(parts) > 1
     order = np.argsort(times, kind="stable") if several else NONE
@@ -207,7 +206,7 @@ def _of_arrays(
 
 
 UNKNOWN, UNREADABLE = -1, -2
-"""Codes of a variable that has no value yet, and of a message that cannot be read."""
+"""Codes of a variable that has no value yet, and of an unreadable message."""
 
 
 class Column:
@@ -221,11 +220,11 @@ class Column:
         self.clear()
 
     def clear(self) -> None:
-        """Forget all codes: those of regions stay what they are."""
+        """Forget all codes, except those of regions, which do not change."""
         self._codes: dict[Hashable, int] = {}
         self._by_value: dict[Hashable, int] = {}
         self.values: list[Value | None] = [None] * (0 if self.regions is None else self.regions.count)
-        """By their codes; of a region, any of its numbers."""
+        """The values by code; for a region, any of its numbers."""
 
     def code_of(self, value: Value) -> int:
         if self.regions is not None and isinstance(value, Fraction):
@@ -255,7 +254,7 @@ class Column:
         return np.array([self._codes[raw] for raw in raws], np.int64), None
 
     def _places(self, numbers: Floats, rough: bool, raws: Sequence[Hashable] | Array, batch: Batch, topic: str) -> Ints:
-        """The regions of numbers. If these are only the nearest doubles, those beside a bound are read."""
+        """The regions of numbers. If these are only the nearest doubles, messages near a bound are read."""
         assert self.regions is not None
         places = self.regions.places(numbers)
         odd = self.regions.unsure(numbers) if rough else ~np.isfinite(numbers)
@@ -279,7 +278,7 @@ class Column:
         return code
 
     def _accumulated(self, raws: Sequence[Hashable], events: Sequence[Event], now: int) -> tuple[Ints, Flags]:
-        """The codes of what was seen so far; the engine has to see what is new."""
+        """The codes of the tuples seen so far; the engine has to judge messages with new ones."""
         fresh = np.zeros(len(events), np.bool_)
         found: list[int] = []
         for k, (raw, event) in enumerate(zip(raws, events, strict=True)):
@@ -316,10 +315,10 @@ def combinations(columns: Sequence[Ints], widths: Sequence[int]) -> tuple[Ints, 
 class Regions:
     """The numbers that clauses compare a variable with: each of them, and all numbers between two of them, make the
     same clauses true. A double is placed exactly: it lies above a number if it is greater than the greatest double that
-    is not."""
+    is not above it."""
 
     def __init__(self, numbers: Iterable[Fraction], wire: str) -> None:
-        """Raises OverflowError for a number that no double is near to."""
+        """Raises OverflowError for a number beyond the range of doubles."""
         self._wire = wire
         self._numbers = sorted(numbers)
         near = [(number, float(number)) for number in self._numbers]
@@ -330,7 +329,7 @@ class Regions:
 
     @classmethod
     def of(cls, rule: Rule, formulas: Iterable[Term]) -> Regions | None:
-        """None if the variable is not only compared, or is not a number of its own."""
+        """None if the variable does not only occur in comparisons, or is not a single number."""
         if not isinstance(rule, Fields) or rule.take or len(rule.paths) > 1:
             return None
         wire = rule.wire(0)
@@ -346,7 +345,7 @@ class Regions:
             return None
 
     def read(self, array: Array) -> tuple[Floats, bool]:
-        """Numbers as the field's type holds them, and whether they are rough: without a type, digits count."""
+        """Numbers as the field's type holds them, and whether they are rough: without a type, the digits are exact."""
         return array.astype(self._wire or np.float64).astype(np.float64), not self._wire
 
     def place(self, value: Fraction) -> int:
@@ -362,7 +361,7 @@ class Regions:
         return found
 
     def unsure(self, numbers: Floats) -> Flags:
-        """Which of these may, before they were rounded to doubles or to singles, have had another place."""
+        """Which of these may have been in another region before they were rounded to doubles or singles."""
         odd = ~(np.abs(numbers) < LARGEST_SINGLE / 2)
         for low, high in self._rough:
             odd |= (low <= numbers) & (numbers <= high)
@@ -370,7 +369,7 @@ class Regions:
 
 
 def _compared(term: Term, variable: Variable) -> Iterator[Fraction | None]:
-    """The numbers that the variable is compared with; None where it occurs in another way."""
+    """The numbers that the variable is compared with; None if it occurs in another way."""
     match term:
         case Variable():
             if term.qualified == variable.qualified:
@@ -381,7 +380,7 @@ def _compared(term: Term, variable: Variable) -> Iterator[Fraction | None]:
             yield from map(number_of, items)
         case In(item=item, collection=SequenceRange(low=low, high=high)) if _is(item, variable):
             yield from (number_of(low), number_of(high))
-        case _:  # compares nothing itself
+        case _:  # no comparison itself
             for child in term.children:
                 yield from _compared(child, variable)
 

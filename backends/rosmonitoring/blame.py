@@ -1,8 +1,8 @@
-"""Whose fault was it? A breach is followed along the graph, across delays, to the first clause that broke.
+"""Finds the node at fault: a breach is traced along the graph, across delays, to the first clause that broke.
 
-A node whose assumption fails on what another node says is not to blame, and nor is the environment: the other node is,
-where one of its guarantees was broken by that very message; else it was broken in turn by what came before it. Which
-message it was is known from both ends: the guarantee's outputs and the assumption's inputs were read from it.
+A node whose assumption fails on another node's message is not to blame, and neither is the environment: the other node
+is, if that very message broke one of its guarantees; otherwise its own assumption may have been broken before. The
+message is known from both ends: the guarantee's outputs and the assumption's inputs were read from it.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from .watched import Fault, Violation
 
 @dataclass(slots=True)
 class _Origin:
-    """Where a breach began, in words; empty as long as that is open. `event`: the first one's."""
+    """Where a breach began, in words; empty until that is known. `event`: the number of the first event."""
 
     text: str = ""
     event: int = 0
@@ -33,26 +33,26 @@ class _Origin:
 
 @dataclass(slots=True)
 class Blame:
-    """Follows breaches; `told` takes the violations of one event, of all nodes together."""
+    """Traces breaches to their origin; `told` takes the violations of one event, of all nodes together."""
 
     system: System
     monitors: Mapping[str, Monitor]
-    """By their nodes."""
+    """The monitors by their nodes."""
     _feeding: dict[str, dict[str, Edge]] = field(default_factory=dict)
     _broken: dict[tuple[str, str], dict[int, _Origin]] = field(default_factory=dict)
-    """(node, output) → the messages of it with which a guarantee was broken."""
+    """(node, output) → its messages that broke a guarantee."""
     _assumed: dict[str, deque[tuple[Violation, _Origin]]] = field(default_factory=dict)
     """Node → its latest broken assumptions, and where each began."""
     _open: deque[tuple[Violation, _Origin]] = field(default_factory=deque)
-    """Broken assumptions on what a node said that is not judged yet."""
+    """Broken assumptions on a message of a node whose verdict is still open."""
 
     def __post_init__(self) -> None:
         for edge in dataflow(self.system).edges:
             self._feeding.setdefault(edge.target.node, {})[edge.target.port] = edge
 
     def told(self, violations: Sequence[Violation], *, over: bool = False) -> Iterator[Violation]:
-        """The same, with who is to blame. What has to wait until a node's answer is judged is told later, at the latest
-        once the run is `over`."""
+        """The same violations, with their causes. Those that wait for a verdict on another node's answer are reported
+        later, at the latest once the run is `over`."""
         origins: list[tuple[Violation, _Origin]] = []
         for violation in violations:
             if violation.fault is Fault.ASSUMPTION:
@@ -66,7 +66,7 @@ class Blame:
                 case Fault.EXCUSED if origin := self._excuse(violation):
                     self._note(violation, origin)
                 case Fault.EXCUSED | Fault.ASSUMPTION | Fault.PROVIDER | Fault.SILENT | Fault.RATE | Fault.MAPPING:
-                    # no output of the node is wrong by it
+                    # this makes no output of the node wrong
                     pass
                 case _:
                     assert_never(violation.fault)
@@ -78,14 +78,14 @@ class Blame:
         yield from settled
 
     def _excused(self, violation: Violation) -> Violation:
-        """What an assumption excuses, with what broke that, as far as it is known."""
+        """A violation with the cause of the broken assumption that excuses it, if that is known."""
         if violation.fault is not Fault.EXCUSED:
             return violation
         origin = self._excuse(violation)
         return replace(violation, cause=f"{origin.text} caused it" if origin is not None and origin.text else "")
 
     def _settle(self, *, late: bool) -> Iterator[Violation]:
-        """Those whose cause is known; `late`: also those of which it will not be."""
+        """The violations whose cause is known; `late`: also those whose cause will not be known."""
         waiting = 0
         while self._open and waiting < len(self._open):
             violation, origin = self._open.popleft()
@@ -112,25 +112,25 @@ class Blame:
         return " (if the order of arrival is that of cause)" if unsure else ""
 
     def _since(self, node: str, event: int) -> _Origin | None:
-        """Where the assumption began to fail that was broken last before an event."""
+        """Where the assumption that was broken last before an event began to fail."""
         return next((origin for one, origin in reversed(self._assumed.get(node, ())) if one.index <= event), None)
 
     def _excuse(self, violation: Violation) -> _Origin | None:
-        """Where the assumption began to fail that excuses a breach: by what the answer was held against."""
+        """Where the assumption that excuses a breach began to fail: by the inputs that the answer was paired with."""
         pairing = self.monitors[violation.node].exact
         given = [pairing.answered.get(message, {}) for message, _ in violation.heard.values()] if pairing else []
         found = next((origin for one in given if (origin := self._by(violation.node, one)) is not None), None)
         return found or self._since(violation.node, violation.index)
 
     def _by(self, node: str, given: Mapping[str, tuple[int, ...]]) -> _Origin | None:
-        """Where the assumption began to fail that was broken by one of some messages."""
+        """Where the assumption that one of some messages broke began to fail."""
         for one, origin in reversed(self._assumed.get(node, ())):
             if any(message in given.get(name, ()) for name, (message, _) in one.heard.items()):
                 return origin
         return None
 
     def _followed(self, violation: Violation, origin: _Origin, *, late: bool) -> Violation | None:
-        """A broken assumption, with its cause; None as long as that may still be judged, unless it is late."""
+        """A broken assumption, with its cause; None while a verdict on that is still open, unless it is late."""
         node = self.system.contract.node(violation.node)
         edges = {port: self._edges(violation, port) for port in _inputs(node, violation.clause)}
         here = _place(violation)
@@ -160,7 +160,7 @@ class Blame:
         return replace(violation, fault=Fault.PROVIDER, cause=why)
 
     def _edges(self, violation: Violation, port: str) -> list[Edge]:
-        """What feeds an input; of a topic of several publishers, the one that published the message, else all."""
+        """The edges that feed an input: of several publishers, the message's own, or all if unknown."""
         edge = self._feeding.get(violation.node, {}).get(port)
         if edge is None:
             return []
@@ -172,8 +172,8 @@ class Blame:
         return [e for e in several if by and names.placed(e.source.node).name == by] or several
 
     def _cause(self, edge: Edge, violation: Violation, port: str) -> _Origin | None:
-        """Where a breach of the source began that the message was part of (open, while that is not judged); None where
-        there is none."""
+        """Where a breach of the source that includes the message began (empty while its verdict is open); None if there
+        is none."""
         monitor = self.monitors.get(edge.source.node)
         message, _ = violation.heard.get(f"{Role.INPUT}.{port}", (0, ""))
         if monitor is None or not message:
@@ -183,7 +183,7 @@ class Blame:
             return known
         if monitor.waits(violation.index):
             return _Origin()
-        # a node that promised nothing, since what it was told was wrong, passes that on with this message
+        # a node that promised nothing, since its input was wrong, passes the fault on with this message
         if monitor.exact is not None:
             return self._by(edge.source.node, monitor.exact.answered.get(message, {}))
         latest = all(message >= other for other, _ in violation.heard.values())
@@ -201,6 +201,6 @@ def _inputs(node: Node, clause: str) -> list[str]:
 
 
 def _failing(monitor: Monitor) -> bool:
-    """Whether an assumption does not hold of the values that are known now."""
+    """Whether an assumption fails for the currently known values."""
     known = (a for a in monitor.assumptions if a.steps is None and monitor.values.keys() >= set(a.names))
     return any(assumed.truth_of(monitor.values, monitor.solver) is False for assumed in known)

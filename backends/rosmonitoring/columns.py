@@ -1,10 +1,10 @@
 """A trace judged by columns: events at which every clause certainly holds are counted, the engine judges all others.
 
-The engine (`engine`) is exact and looks at one event at a time. Here a batch of events is sorted by topic, and each
-variable of each monitor becomes an array of codes: equal codes, equal truth of every clause. A clause is evaluated once
-for each combination of codes. Where it holds, the event only moves the counters. Any other event, and one with an
+The engine (`engine`) is exact and handles one event at a time. Here a batch of events is sorted by topic, and each
+variable of each monitor becomes an array of codes: equal codes mean equal truth of every clause. A clause is evaluated
+once for each combination of codes. If it holds, the event only updates the counters. Any other event, and one with an
 irregular time, number or key, goes to the engine, which is first brought up to date. So the engine finds every
-violation, and a run is summed up as if the engine had judged all of it.
+violation, and the counts of a run are the same as if the engine had judged all of it.
 """
 
 from __future__ import annotations
@@ -35,19 +35,19 @@ from .tuning import REMEMBERED, TOPICS_KEPT
 from .watched import Violation, Watched
 
 Found = Iterator[tuple[int, list[Violation]]]
-"""Lines, and what was found there."""
+"""Lines, and the violations found there."""
 
 
 @dataclass(frozen=True, slots=True)
 class _Plan:
-    """What one topic's messages do to one monitor, where nothing but their values matters."""
+    """The effect of one topic's messages on one monitor, if only their values matter."""
 
     names: tuple[str, ...]
     """The variables that the topic carries."""
     due: tuple[Watched, ...]
     """The clauses that are judged by the latest values."""
     asked: tuple[Watched, ...]
-    """Those whose answers wait for the inputs that they answered."""
+    """The clauses whose answers wait for the inputs that they answered."""
 
 
 @dataclass(slots=True)
@@ -55,9 +55,9 @@ class _Judged:
     """One clause at the rows of one topic."""
 
     met: Flags
-    """Where the antecedent is met."""
+    """The rows at which the antecedent is met."""
     ages: dict[str, Floats] = field(default_factory=dict)
-    """How old each input is; -1 where it has not come."""
+    """The age of each input, in seconds; -1 if it has not come."""
 
 
 class Watch:
@@ -70,7 +70,7 @@ class Watch:
         sources = {rule.source for rule in rules.values() if isinstance(rule, Previous)}
         self._columns: dict[str, Column] = {}
         for name, rule in monitor.setup.carried.items():
-            # the step before is the source's value: both have one column, and the source's clauses alone set no regions
+            # a previous value is the source's value: both share a column, and the source's clauses alone set no regions
             self._columns[name] = Column(rule, monitor.reader_of(name), () if name in sources else formulas)
             if name in sources:
                 self._columns[name].regions = None
@@ -83,9 +83,9 @@ class Watch:
         """The rows of each variable in the batch, and its codes there."""
         self._judged: dict[tuple[str, int], _Judged] = {}
         self.answers: Paired | None = None
-        """Those of the batch, if they are paired with their inputs."""
+        """The answers of the batch, if they are paired with their inputs."""
         self.gap = False
-        """Whether a message of the batch does not have the number after that of the one before."""
+        """Whether a message of the batch does not have the number after that of its predecessor."""
         if monitor.pairing is not None:
             monitor.pairing.readers = {name: monitor.reader_of(name) for name in self._columns}
         self._clear()
@@ -112,7 +112,7 @@ class Watch:
         return self._plans[topic]
 
     def _planned(self, topic: str) -> _Plan | None:
-        """None where more than the latest values matters: then the engine judges all messages of the topic."""
+        """None if more than the latest values matters: then the engine judges all messages of the topic."""
         monitor, names = self.monitor, self.monitor.carried(topic)
         setup, answers = monitor.setup, None if monitor.pairing is None else monitor.pairing.answers
         if not names or not monitor.by_values or not (setup.shared.keys() | setup.rates.keys()).isdisjoint(names):
@@ -154,7 +154,7 @@ class Watch:
         return wrong
 
     def pair(self, batch: Batch, wrong: Flags) -> None:
-        """Find the answers that certainly held; `wrong` gets the rows of the others."""
+        """Find the answers that certainly held; the rows of the others are added to `wrong`."""
         pairing = self.monitor.pairing
         self.answers = None if pairing is None else Paired(self, pairing, batch, wrong)
 
@@ -172,7 +172,7 @@ class Watch:
                 self._now[name] = UNKNOWN if value is None else column.code_of(value)
 
     def _disordered(self, topic: str, batch: Batch) -> Flags:
-        """Messages with the time of the one before, and with numbers that are not the next; the very first."""
+        """The messages with the time of their predecessor, or without the next number; and the very first."""
         passage = self.monitor.timing.passages.get(topic)
         before = math.nan if passage is None or passage.latest is None else float(passage.latest)
         times = batch.times[batch.rows[topic]]
@@ -194,7 +194,7 @@ class Watch:
         return wrong
 
     def codes(self, name: str, rows: Ints) -> Ints:
-        """The codes of the latest values of a variable; of the step before, of the values before these rows."""
+        """The codes of the latest values of a variable; for the step before, of the values before these rows."""
         rule = self._rules[name]
         own, codes = self._known.get(heard_through(rule), (NONE, NONE))
         if own is rows and not isinstance(rule, Previous):
@@ -203,8 +203,8 @@ class Watch:
         return np.concatenate(([self._now[name]], codes))[np.searchsorted(own, rows, side)]  # type: ignore[call-overload]
 
     def holds(self, watched: Watched, rows: Ints, others: Mapping[str, Ints]) -> tuple[Flags, Flags, Flags]:
-        """At which rows a clause certainly holds, where its antecedent is met, and where it certainly does not hold.
-        `others`: codes that are not of the latest values."""
+        """The rows at which a clause certainly holds, at which its antecedent is met, and at which it certainly does
+        not hold. `others`: codes that are not of the latest values."""
         names = [name for name in watched.names if name in self._now]
         columns = [others[name] if name in others else self.codes(name, rows) for name in names]
         known: Flags = np.logical_and.reduce([codes >= 0 for codes in columns])
@@ -229,8 +229,8 @@ class Watch:
         return column
 
     def _judge(self, watched: Watched, codes: Mapping[str, int]) -> tuple[bool, bool, bool]:
-        """Whether a clause holds of values, whether its antecedent is met (if evaluation does not tell, it is), and
-        whether it does not hold."""
+        """Whether a clause holds for the values, whether its antecedent is met (also if it cannot be evaluated), and
+        whether the clause fails."""
         values: dict[str, Any] = {n: self.monitor.values[n] for n in watched.names if n not in codes}
         values |= {name: self._column_of(name).values[code] for name, code in codes.items()}
         try:
@@ -249,7 +249,7 @@ class Watch:
         return np.where(ages == -math.inf, -1.0, np.maximum(ages, 0.0))
 
     def count(self, batch: Batch, start: int, end: int) -> None:
-        """Take over some events that need not be judged."""
+        """Take over the events from `start` to `end`, which need not be judged."""
         monitor = self.monitor
         monitor.events += end - start
         last: list[int] = []
@@ -283,7 +283,7 @@ class Watch:
             self.answers.note(start, end)
 
     def settle(self, batch: Batch, row: int) -> list[Violation]:
-        """Judge the answers that need not wait any longer at a row."""
+        """Judge the answers that no longer have to wait at a row."""
         found: list[Violation] = []
         if self.monitor.pairing is not None and self.monitor.pairing.waiting:
             self.monitor.settle(ticks_at(batch.event(row)), found)
@@ -297,8 +297,8 @@ def _spread(where: Flags, flags: Flags) -> Flags:
 
 
 class Columns:
-    """Feed it a trace. `told` is given what the monitors find at one event, and may explain it; `heard` is told of
-    topics, and how many events of them there were."""
+    """Feed it a trace. `told` receives the violations that the monitors find at one event, and may explain them;
+    `heard` receives topics, and the number of their events."""
 
     def __init__(
         self,
@@ -314,7 +314,7 @@ class Columns:
         self._line = 0
         self._by_arrival = any(monitor.by_arrival for monitor in monitors)
         self._one_by_one = False
-        """The engine judges all: on a running graph, answers wait for what is heard after them."""
+        """The engine judges every event: on a running graph, answers wait for later messages."""
 
     def run(self, path: Path) -> Found:
         """Judge the lines of a file, as `lines` does. Raises Rejected."""
@@ -325,9 +325,9 @@ class Columns:
             raise Rejected(Diagnostic("MON201", f"cannot read {path}: {error.strerror or error}")) from None
 
     def lines(self, read: Callable[[int], bytes], name: str) -> Found:
-        """Judge the lines of a stream, which `read` gives as they come (none at its end): the line, and what was found
-        there; nothing of lines where all is well, but once in each megabyte (so that whoever waits can look at the
-        clock). Raises Rejected, OSError."""
+        """Judge the lines of a stream, which `read` returns as they come (empty at its end): the line, and the
+        violations found there. Lines without violations give no result, except one in each megabyte, so that the caller
+        can check the clock. Raises Rejected, OSError."""
         for chunk in chunks(read, name):
             events, lines, count, wrong = parsed(chunk, name, self._line)
             self._one_by_one = self._one_by_one or (self._by_arrival and LIVE.encode() in chunk)
@@ -383,8 +383,8 @@ class Columns:
                 yield batch.lines[due], list(self._told(found))
 
     def _times(self, batch: Batch) -> tuple[Floats, Flags]:
-        """The latest time so far, at each event, and the events of which the engine has to judge the time: it goes
-        back, or it is the same as before but written otherwise; and the very first."""
+        """The latest time so far, at each event, and the events whose time the engine has to judge: it goes back, or it
+        is the same as before but written differently; and the very first."""
         times, raws = batch.times, batch.raws
         newest = np.maximum.accumulate(np.concatenate(([self._newest], times)))
         wrong: Flags = times < newest[:-1]
@@ -396,7 +396,7 @@ class Columns:
         return newest[1:], wrong
 
     def _horizon(self, batch: Batch, start: int) -> float:
-        """No deadline passes before this time, counted from the messages that come first."""
+        """No deadline passes before this time, counting from the messages that come first."""
         found = math.inf
         for watch in self._watches:
             found = min(found, watch.monitor.deadline)
@@ -424,4 +424,4 @@ class Columns:
 
 
 FEW = 16
-"""Events that are judged one by one at once: arrays of fewer cost more than they save."""
+"""Fewer events than this are judged one by one: arrays of them cost more than they save."""

@@ -81,9 +81,8 @@ def command(
 ) -> int:  # fmt: skip
     """Judge TRACE against the contracts of SYSTEM (a folder, or a name under contracts/).
 
-    TRACE is JSON lines in ROSMonitoring's shape, a ROS 1 or ROS 2 bag, or - for standard input; --live judges a graph
-    that runs. Code 1 where something
-    was broken or nothing could be judged, 2 where an input cannot be used.
+    TRACE is JSON lines in ROSMonitoring's format, a ROS 1 or ROS 2 bag, or - for standard input; --live judges a
+    running graph. Code 1 if something was broken or nothing could be judged, 2 if an input cannot be used.
     """
 
     loaded = load_system(system_folder(system))
@@ -121,7 +120,7 @@ def command(
 
 @dataclass(frozen=True, slots=True)
 class _Output:
-    """How the verdicts are told."""
+    """How the verdicts are reported."""
 
     as_json: bool
     show_all: bool
@@ -130,7 +129,7 @@ class _Output:
 
     @property
     def monitor(self) -> type[Monitor]:
-        """Those that judge."""
+        """The class of the monitors."""
 
         return Monitor if self.mcap is None else Telling
 
@@ -161,7 +160,7 @@ def _live(
 
 @contextmanager
 def _until(seconds: float | None) -> Iterator[Callable[[], bool]]:
-    """Whether so many seconds have passed, or Ctrl-C was pressed; a second one interrupts at once."""
+    """Whether `seconds` have passed, or Ctrl-C was pressed; a second Ctrl-C interrupts at once."""
 
     interrupted = threading.Event()
     end = None if seconds is None else time.monotonic() + seconds
@@ -184,13 +183,13 @@ def _warn(text: str) -> None:
 def _judge(system: System, nodes: tuple[str, ...], trace: str, telling: _Output) -> int:
 
     running = session(system, nodes, None if trace == "-" else Path(trace), telling.monitor)
-    # each with the line of the event at which it was found; the last line's where it took the whole run
+    # each with the line of its event; the last line if it was found at the end of the run
     found = running.read(cast(io.BufferedReader, sys.stdin.buffer).read1) if trace == "-" else running.run(Path(trace))
     return _told(running, found, trace, telling)
 
 
 def _told(running: Session, violations: Iterator[tuple[int, Violation]], trace: str, telling: _Output) -> int:
-    """Show what was found, and what became of each clause; the exit code."""
+    """Show the violations, and the results of each clause. Returns the exit code."""
 
     shown: list[dict[str, Any]] = []
     counts = Counter[tuple[str, str, str]]()
@@ -224,7 +223,7 @@ def _told(running: Session, violations: Iterator[tuple[int, Violation]], trace: 
 
 
 def _recorder(running: Session, path: Path) -> Recorder:
-    """An MCAP that hears each judgement. Raises Rejected."""
+    """An MCAP that records each judgement. Raises Rejected."""
 
     recorder = Recorder(path)
     for monitor in running.monitors:
@@ -244,7 +243,7 @@ def _draw(running: Session, trace: Path, marks: Marks, path: Path) -> None:
 
 
 def _write(path: Path, text: str) -> None:
-    """Raises Rejected."""
+    """Write a file. Raises Rejected."""
 
     try:
         path.write_text(text, encoding="utf-8")
@@ -298,7 +297,7 @@ def _print_summary(running: Session) -> None:
 def _serve(system: System, nodes: tuple[str, ...], port: int) -> None:
     from .live.serve import HOST, serve
 
-    session(system, nodes)  # a fault of the plan is told now, not at the first connection
+    session(system, nodes)  # an error in the plan is reported now, not at the first connection
 
     def ready(server: Any) -> None:
         click.echo(f"the oracle of {system.name} listens on ws://{HOST}:{server.socket.getsockname()[1]}")

@@ -1,4 +1,4 @@
-"""ROSMonitoring's configuration (3.0) of one node or all: which topics the monitors listen to, filter and order."""
+"""ROSMonitoring's configuration (3.0) of one node or all: the topics that the monitors listen to, filter and order."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def identifier(prefix: str, name: str) -> str:
 
 
 def dotted_type(ros_type: str) -> str:
-    """``package/Type``, ``package/msg/Type`` or a built-in as ``package.msg.Type``. The generator imports that."""
+    """``package/Type``, ``package/msg/Type`` or a built-in as ``package.msg.Type``, which the generator imports."""
     parts = ros_type.split("/")
     if len(parts) == 1:
         builtin = parts[0]
@@ -46,13 +46,13 @@ def _topic_types(setup: Setup) -> dict[str, str]:
 
 
 def configuration(setup: Setup, options: Mapping[str, Any]) -> str:
-    """One node's file."""
+    """The file of one node."""
     return _file([_monitor(setup, options)], _nodes(setup, options), options.get("ros_version"))
 
 
 def of_system(parts: Sequence[tuple[Setup, Mapping[str, Any]]]) -> str:
-    """One file for all nodes: the generator makes one package of a file, and each of its packages has the same name.
-    Nodes of which nothing can be observed are left out. Raises Rejected where the methods do not agree."""
+    """One file for all nodes: the generator makes one package of each file, always with the same name. Nodes without
+    observable topics are left out. Raises Rejected if the methods do not agree."""
     versions = {str(options["ros_version"]) for _, options in parts if "ros_version" in options}
     if len(versions) > 1:
         text = f"the methods say {' and '.join(sorted(versions))} as `ros_version`, and one file is for one"
@@ -97,7 +97,7 @@ def _monitor(setup: Setup, options: Mapping[str, Any]) -> dict[str, Any]:
             "action": str(oracle.get("action", "nothing")),
             "timeout": float(oracle.get("timeout", 2.0)),
         }
-    filtered = setup.filtered if "oracle" in monitor else frozenset[str]()  # it is the oracle that says what is broken
+    filtered = setup.filtered if "oracle" in monitor else frozenset[str]()  # only an oracle decides what is broken
     monitor["topics"] = []
     for name, kind in _topic_types(setup).items():
         topic: dict[str, Any] = {"name": name, "type": kind, "action": "log"}
@@ -110,8 +110,8 @@ def _monitor(setup: Setup, options: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _problems(monitors: Sequence[Mapping[str, Any]]) -> Iterator[str]:
-    """What ROSMonitoring's validator or generator would stumble over, as far as contract and plan can bring it about
-    (the tests ask for the rest: `tests/oracle/rosmonitoring.py`)."""
+    """The errors of ROSMonitoring's validator or generator that contract and plan can cause (the tests check the rest:
+    `tests/oracle/rosmonitoring.py`)."""
     if not monitors:
         yield "`monitors` must be a list of monitors"
     filtered: set[str] = set()

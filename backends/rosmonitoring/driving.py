@@ -1,4 +1,4 @@
-"""``avow drive``: run a node's callback class without ROS; what it publishes as a trace, or against a recording."""
+"""``avow drive``: run a node's callback class without ROS; its output as a trace, or compared with a recording."""
 
 from __future__ import annotations
 
@@ -44,12 +44,12 @@ def command(
     """Run the callback class that the plan of SYSTEM (a folder, or a name under contracts/) declares as NODE, in
     virtual time and without ROS.
 
-    It hears the messages that TRACE (JSON lines or a bag) has on its topics, or without TRACE generated ones. -o writes
-    what it heard and published, for `avow monitor` and as a trace of the plan. --replay compares its publications with
-    those of TRACE, topic by topic, in their order and every bit of them; times are not compared.
+    It receives the messages that TRACE (JSON lines or a bag) has on its topics, or generated ones without TRACE. -o
+    writes what it received and published, for `avow monitor` and as a trace of the plan. --replay compares its
+    publications with those of TRACE, topic by topic, in order and bit by bit; times are not compared.
 
-    Code 1 where the class raises, or publishes otherwise than the recording; 2 where it asks for something of ROS that
-    is not driven, or where what it publishes hangs on a clock or on chance.
+    Code 1 if the class raises, or its publications differ from the recording; 2 if it uses a part of ROS that is not
+    driven, or if what it publishes depends on a clock or on chance.
     """
 
     if replay and trace is None:
@@ -94,7 +94,7 @@ def command(
 
 
 def _recorded(found: Driver, trace: Path) -> Iterator[tuple[Event, Any]]:
-    """The trace's messages on topics that the class hears or says, in the order of the trace. Raises Rejected."""
+    """The trace's messages on the class's topics, in the order of the trace. Raises Rejected."""
 
     before = 0
     for recorded in read_trace(trace, wanted=lambda topic: _whole(topic) in found.carried):
@@ -123,7 +123,7 @@ def _lines(found: Driver, events: Iterable[Event]) -> Iterator[str]:
 
 
 def _different(found: Driver, recorded: tuple[tuple[Event, Any], ...], run: Run) -> Iterator[str]:
-    """Topic by topic the publications that are not as recorded, the first of them in full."""
+    """For each topic, the publications that differ from the recording, the first of them in full."""
 
     for topic in sorted(run.spoken):
         said = [event for event in run.said if event.topic == topic]

@@ -1,9 +1,9 @@
-"""Our own monitor: the clauses of one node over events, judged exactly. The cost of an event does not grow with them.
+"""The exact monitor: judges the clauses of one node over events. The cost of an event does not grow with their number.
 
-A snapshot maps each variable to its latest value. A clause is judged when events have brought a value of each of its
-outputs (the node has answered), a clause about inputs when one brings any of them, by the values then known; until
-every variable has a value it is not judged. A guarantee that fails while an assumption is broken is laid at the
-environment's door, not the node's.
+A snapshot maps each variable to its latest value. A clause is judged, by the values then known, when events have
+brought a value of each of its outputs (the node has answered); a clause about inputs, when an event brings any of them.
+It is not judged until every variable has a value. A guarantee that fails while an assumption is broken is attributed to
+the environment, not to the node.
 """
 
 from __future__ import annotations
@@ -36,12 +36,12 @@ from .word import Message, Word, follow, word_of
 
 @dataclass(slots=True)
 class Monitor:
-    """Feed it events with `step`. `guarantees` are the names of those to judge (by default all that are written)."""
+    """Feed it events with `step`. `guarantees`: the names of those to judge (by default all that are written)."""
 
     setup: Setup
     guarantees: Iterable[str] | None = None
     solver: bool = True
-    """Ask Z3 where evaluation alone cannot answer."""
+    """Whether to use Z3 if evaluation alone cannot decide."""
     events: int = 0
     relevant: int = 0
     tallies: dict[str, Tally] = field(default_factory=dict)
@@ -49,51 +49,51 @@ class Monitor:
     heard: set[str] = field(default_factory=set)
     """The topics of the messages so far."""
     at: dict[str, tuple[int, str]] = field(default_factory=dict)
-    """Which message each variable's value is of: as `Heard`."""
+    """The message that each variable's value is from, as in `Heard`."""
     _seen: set[str] = field(default_factory=set)
     versions: dict[str, int] = field(default_factory=dict)
     _readers: dict[str, list[tuple[str, Reader]]] = field(default_factory=dict)
     previous: list[tuple[str, str]] = field(default_factory=list)
     clauses: dict[str, list[Watched]] = field(default_factory=dict)
-    """Those that are judged when a variable is published."""
+    """The clauses that are judged when a variable is published."""
     assumptions: list[Watched] = field(default_factory=list)
     timing: Timing = field(init=False)
     pairing: Pairing | None = None
-    """Answers and the inputs that they are held against; None: the latest."""
+    """Answers and the inputs that they are paired with; None: the latest."""
     doubts: Doubts | None = None
-    """Where it is the latest, since an event came that was heard on a running graph."""
+    """The breaches that wait, if these are the latest: set once an event came from a running graph."""
     paired: frozenset[str] = frozenset()
     """The observed inputs."""
     prompt: bool = False
-    """Breaches are told when they are seen, though they may be withdrawn (`by_order`)."""
+    """Breaches are reported when they are seen, even if they may be withdrawn (`by_order`)."""
     by_order: dict[str, Watched] = field(default_factory=dict)
-    """The clauses of which a verdict may be of messages that do not belong together, which shows only at the end."""
+    """The clauses whose verdict may be about messages that do not belong together, which is known only at the end."""
     in_doubt: list[Violation] = field(default_factory=list)
     """Their breaches."""
     word: Word | None = None
-    """The order of the steps, where clauses speak of others and `answers` tells it."""
+    """The order of the steps, if clauses speak of other steps and `answers` determines it."""
     assumed: tuple[str, ...] = ()
-    """What the assumptions speak of."""
+    """The variables of the assumptions."""
     backwards: str = ""
-    """Where the events' times contradict the order in which they came, though the plan goes by that order."""
+    """Where the events' times contradict the order in which they came, if the plan relies on that order."""
     settled: set[int] = field(default_factory=set)
-    """The clauses of which answers were judged since this was last emptied."""
+    """The ids of the clauses whose answers were judged since this was last emptied."""
     _latest: Fraction | None = None
     supposed: set[str] = field(default_factory=set)
-    """What has an initial value of the plan, and no message yet."""
+    """The variables that have an initial value of the plan, and no message yet."""
     questions: int = OPEN_QUESTIONS
     _constant: list[Watched] = field(default_factory=list)
     """Clauses that no message changes: judged once, at the first event."""
     _remembering: list[Watched] = field(default_factory=list)
     """Clauses that speak of other steps."""
     _timed: list[Watched] = field(default_factory=list)
-    """Those that also speak of the time between steps, assumptions first."""
+    """Those of them that also speak of the time between steps, assumptions first."""
     _clock: Clock | None = None
-    """Where it does not go by the times of the events."""
+    """The clock, if it is not the times of the events."""
     since: dict[str, float] = field(default_factory=dict)
-    """When the message came that each variable's value is of, in the word."""
+    """When the message came that each variable's value is from, in the word."""
     so_far: SoFar | None = None
-    """Of a node whose clauses speak of other steps."""
+    """For a node whose clauses speak of other steps."""
 
     def __post_init__(self) -> None:
         self.timing = Timing(self.setup.fresh, self.setup.rates)
@@ -127,19 +127,19 @@ class Monitor:
                     self._readers.setdefault(same_topic(rule.topic), []).append((name, reader(rule)))
                     self.values |= {} if rule.initial is None else {name: rule.initial}
                     if rule.initial is not None and of_latest(rule):
-                        self.supposed.add(name)  # of tuples seen so far, none is what was seen
+                        self.supposed.add(name)  # an empty set of tuples seen so far is an observation
         for name, source in self.previous:
             if name not in self.values and source in self.values:
                 self.values[name] = self.values[source]
 
     def listens(self, topic: str) -> bool:
-        """Whether a topic's messages say anything of the node, or of its time."""
+        """Whether a topic's messages concern the node, or its time."""
         known = same_topic(topic)
         return known in self._readers or (known == SIMULATED and self.setup.time is By.SIM)
 
     def step(self, event: Mapping[str, Any], place: int = 0) -> list[Violation]:
-        """Judge one event, which stands at a place of the trace (by default, its number). Never raises for what the
-        event holds."""
+        """Judge one event, at a place of the trace (by default, its number). Never raises, whatever the event
+        contains."""
         self.events += 1
         if self._clock is None:
             return sure(self, self._step(event, place))
@@ -199,10 +199,10 @@ class Monitor:
             try:
                 new = read(event, old)
             except MappingError as error:
-                if self.tallies:  # of a node that has promised nothing yet, no value is missed
+                if self.tallies:  # a node without clauses to judge misses no value
                     found.append(self.violation(Fault.MAPPING, name, event, str(error)))
                 self.miss({name})
-                # Its value is now unknown: what needs it waits for the next good message.
+                # Its value is now unknown: clauses that need it wait for the next good message.
                 if of_latest(self.setup.rules[name]):
                     self.forget(name)
                 if self.kept is not None and (pairing is None or name in self.paired):
@@ -219,7 +219,7 @@ class Monitor:
         return updated
 
     def conclude(self, updated: Mapping[str, bool], event: Mapping[str, Any], found: list[Violation]) -> None:
-        """Judge what is due now that these variables have new values (where they could be read)."""
+        """Judge the clauses that are due now that these variables have new values (if they could be read)."""
         hear(self._remembering, (name for name, readable in updated.items() if readable))
         while self._constant:
             self._judge(self._constant.pop(), event, found)
@@ -238,7 +238,7 @@ class Monitor:
 
     @property
     def by_arrival(self) -> bool:
-        """Whether an answer is held against what came before it."""
+        """Whether an answer is compared with the values that came before it."""
         return self.pairing is None and self.word is None
 
     @property
@@ -248,7 +248,7 @@ class Monitor:
 
     @property
     def exact(self) -> Pairing | Word | None:
-        """What knows which messages an answer answered."""
+        """The pairing or word that knows which messages an answer answered."""
         return self.word or self.pairing
 
     def waits(self, event: int) -> bool:
@@ -257,7 +257,7 @@ class Monitor:
         return waiting or any(v.index <= event for v in self.in_doubt[:1])
 
     def known(self, watched: Watched, answer: Answer | None) -> Mapping[str, Value]:
-        """The values by which an answer is judged: the latest, but for those of the step before, and those of its own
+        """The values by which an answer is judged: the latest, except those of the step before, and those of its own
         parts."""
         values = self.values
         if watched.held:
@@ -275,7 +275,7 @@ class Monitor:
         return [] if passed is None else self._tick(passed, frozenset())
 
     def _tick(self, event: Mapping[str, Any], names: Set[str]) -> list[Violation]:
-        """The same, with or without a message of these variables."""
+        """Time has passed, with or without a message of these variables."""
         late = self.timing.passes(event, names)
         found = [self.violation(Fault.SILENT if silent else Fault.RATE, n, event, wrong) for n, wrong, silent in late]
         if self.doubts is not None and self.doubts.pairing.waiting:
@@ -291,7 +291,7 @@ class Monitor:
         return min(self.timing.deadline, soonest(self._timed)) if self._clock is None else math.inf
 
     def settle_previous(self) -> None:
-        """An answer is over: what it said is now what the step before said."""
+        """An answer is over: its values are now those of the step before."""
         for name, source in self.previous:
             value = self.values.get(source)
             if source in self.at:
@@ -304,7 +304,7 @@ class Monitor:
                 self.versions[name] += 1
 
     def passages(self, names: Set[str] | None = None) -> list[tuple[str, Passage]]:
-        """What got lost on the topics that carry some variables (by default any)."""
+        """The losses on the topics that carry some variables (by default any)."""
         return [
             (topic, passage)
             for topic, passage in self.timing.passages.items()
@@ -315,12 +315,12 @@ class Monitor:
 
     @property
     def by_values(self) -> bool:
-        """Whether a verdict depends on values alone, the latest or those that an answer answered, and changes nothing
-        for the next."""
+        """Whether a verdict depends on values alone, the latest or those that an answer answered, and does not affect
+        the next."""
         return self.so_far is None and self._clock is None
 
     def reader_of(self, name: str) -> Reader:
-        """What reads a variable that messages carry."""
+        """The reader of a variable that messages carry."""
         return next(read for readers in self._readers.values() for of, read in readers if of == name)
 
     def carried(self, topic: str) -> tuple[str, ...]:
@@ -328,7 +328,7 @@ class Monitor:
         return tuple(name for name, _ in self._readers.get(same_topic(topic), ()))
 
     def caught_up(self, event: Mapping[str, Any], place: int) -> None:
-        """Take over the latest of some events of one topic that could all be read."""
+        """Take over the latest of some events of one topic, all of which could be read."""
         topic = same_topic(str(event["topic"]))
         self.at.update(dict.fromkeys(self.carried(topic), (place, publisher(event))))
         self.timing.caught_up(event, topic, self.carried(topic))
@@ -343,7 +343,7 @@ class Monitor:
             self._latest = max(self._latest, time_of(event))
 
     def finish(self) -> list[Violation]:
-        """Judge what still waits, once the run is over."""
+        """Judge the answers that still wait, once the run is over."""
         found: list[Violation] = []
         self.backwards = self.backwards or ("" if self._clock is None else self._clock.finish())
         if self.kept is not None:
@@ -365,7 +365,7 @@ class Monitor:
         return withdraw(self, found) if self.backwards else found
 
     def settle(self, now: Ticks | None, found: list[Violation]) -> None:
-        """Judge the answers whose inputs are known by a time (None: the run is over)."""
+        """Judge the answers whose inputs are known at a time (None: the run is over)."""
         assert self.kept is not None
         for asked, choices in self.kept.ready(now):
             self.settled.add(id(asked.watched))
@@ -380,8 +380,8 @@ class Monitor:
     def _due(
         self, readable: Mapping[str, bool], event: Mapping[str, Any], found: list[Violation]
     ) -> list[tuple[Watched, Answer | None]]:
-        """The clauses to be judged now that these variables have new values (where they could be read), and of which
-        answer. A part of an answer that is published anew before the answer is whole is judged by itself."""
+        """The clauses to be judged now that these variables have new values (if they could be read), each with its
+        answer. A part of an answer that is published again before the answer is complete is judged by itself."""
         touched: dict[int, tuple[Watched, dict[str, bool]]] = {}
         for name in readable:
             for watched in self.clauses.get(name, ()):
@@ -396,7 +396,7 @@ class Monitor:
                 due.append((watched, None))
             else:
                 watched.tally.unreadable += 1
-        if self.so_far is not None:  # whether a guarantee was promised depends on what they find
+        if self.so_far is not None:  # whether a guarantee was promised depends on the assumptions' verdicts
             due.sort(key=lambda one: one[0].clause.kind is not ClauseKind.ASSUMPTION)
         return due
 
@@ -406,7 +406,7 @@ class Monitor:
         judge_part(self, watched, parts, event, found)
 
     def spoken(self, watched: Watched) -> tuple[str, ...]:
-        """What a clause and the assumptions speak of."""
+        """The variables of a clause and of the assumptions."""
         return (*watched.names, *(n for assumed in self.assumptions for n in assumed.names))
 
     def about(self, names: Iterable[str]) -> tuple[Watched, ...]:
@@ -447,7 +447,7 @@ class Monitor:
                 self.lose(watched)
 
     def lose(self, watched: Watched) -> None:
-        """A step of a clause went by unseen."""
+        """A step of a clause was not seen."""
         if watched.steps is not None:
             watched.steps.forget()
         if self.so_far is not None and watched.clause.kind is ClauseKind.ASSUMPTION:

@@ -1,5 +1,5 @@
-"""A monitor that tells each judgement as it is made, with its margin: for those who plot. As an MCAP these are read by
-Foxglove, PlotJuggler, and whatever else reads JSON channels."""
+"""A monitor that reports each judgement as it is made, with its margin, for plots. As an MCAP, the judgements can be
+read by Foxglove, PlotJuggler, and other readers of JSON channels."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ from .watched import Answer, Fault, Part, Tally, Violation, Watched
 
 @dataclass(frozen=True, slots=True)
 class Judgement:
-    """Of one clause at one event: `held`, `broken`, `excused` (broken, with an assumption broken), `undecided`, or
-    `unpaired` (undecided which input was answered). `margin`: see `_margin_of`."""
+    """The judgement of one clause at one event: `held`, `broken`, `excused` (broken, with an assumption broken),
+    `undecided`, or `unpaired` (undecided which input was answered). `margin`: see `_margin_of`."""
 
     node: str
     clause: str
@@ -36,14 +36,14 @@ class Judgement:
     verdict: str
     margin: float | None
     now: Fraction
-    """When it was judged: later than `time` where the answer had to wait."""
+    """When it was judged, in seconds: later than `time` if the answer had to wait."""
 
 
 Margin = Callable[[Mapping[str, Value]], float | None]
 
 
 class Telling(Monitor):
-    """The engine itself; `tell` gets each judgement."""
+    """The engine itself; `tell` receives each judgement."""
 
     tell: Callable[[Judgement], None] = staticmethod(lambda judgement: None)
 
@@ -55,7 +55,7 @@ class Telling(Monitor):
 
     @property
     def by_values(self) -> bool:
-        """No event is passed over: each judgement is told."""
+        """No event is skipped: each judgement is reported."""
         return False
 
     def step(self, event: Mapping[str, Any], place: int = 0) -> list[Violation]:
@@ -105,7 +105,7 @@ class Telling(Monitor):
 
 
 def _verdict_between(before: Tally, after: Tally) -> str:
-    """What was judged, by what was counted; empty where nothing was."""
+    """The verdict that the change of the counts shows; empty if nothing was judged."""
     if after.excused > before.excused:
         return "excused"
     if after.broken > before.broken:
@@ -118,9 +118,9 @@ def _verdict_between(before: Tally, after: Tally) -> str:
 
 
 def _margin_of(formula: Term) -> Margin | None:
-    """How far a comparison of numbers is from being broken, negative where it is: of ``a <= b`` and ``a < b``, b - a;
-    of ``a == b``, minus their distance; of ``a != b``, their distance; of a conjunction, the least. None of any other
-    formula. At 0 the operator decides."""
+    """The distance of a comparison of numbers from being broken, negative if it is: ``b - a`` for ``a <= b`` and for
+    ``a < b``, minus the numbers' distance for ``a == b``, their distance for ``a != b``, and the least for a
+    conjunction. None for any other formula. At 0 the operator decides."""
     match formula:
         case And(items=items):
             parts = [_margin_of(item) for item in items]
@@ -136,7 +136,7 @@ def _margin_of(formula: Term) -> Margin | None:
             except NotEvaluable:
                 return None
             return lambda values: _distance(operator, one, other, values)
-        case _:  # nothing with a threshold
+        case _:  # no threshold
             return None
 
 
@@ -166,7 +166,7 @@ def _distance(
 
 
 def as_float(number: Fraction | int) -> float:
-    """The nearest one, or the largest."""
+    """The nearest double, or the largest."""
     try:
         return float(number)
     except OverflowError:
@@ -174,7 +174,7 @@ def as_float(number: Fraction | int) -> float:
 
 
 _VALUES = {"held": 1, "excused": 0, "undecided": 0, "unpaired": 0, "broken": -1}
-"""Plots show numbers: above 0 all is well, below it is not."""
+"""Plots show numbers: above 0 is held, below 0 is broken."""
 
 _LAST = 2**64 - 1
 
@@ -186,10 +186,10 @@ _SCHEMAS = {
 
 
 class Recorder:
-    """An MCAP that is being written: `/avow/NODE/CLAUSE/verdict`, `/avow/NODE/CLAUSE/margin`, `/avow/NODE/findings`."""
+    """Writes an MCAP: `/avow/NODE/CLAUSE/verdict`, `/avow/NODE/CLAUSE/margin`, `/avow/NODE/findings`."""
 
     def __init__(self, path: Path) -> None:
-        """Raises Rejected where it cannot be written, or without the package mcap."""
+        """Raises Rejected if it cannot be written, or without the package mcap."""
         try:
             from mcap.writer import Writer
         except ImportError:
@@ -224,8 +224,8 @@ class Recorder:
             self._write(f"{topic}/margin", "margin", {"margin": judgement.margin, "event": judgement.event})
 
     def found(self, violation: Violation) -> None:
-        """Whatever was told, in words: also what is no clause's (a silence, a message that could not be read)."""
-        with suppress(ValueError, ZeroDivisionError):  # of an event without a time: that of the latest
+        """A violation in words, including one of no clause (a silence, an unreadable message)."""
+        with suppress(ValueError, ZeroDivisionError):  # for an event without a time: that of the latest
             self._latest = _nanoseconds(Fraction(violation.time))
         about = {"fault": violation.fault.name.lower(), "about": violation.clause, "text": violation.text()}
         self._write(f"/avow/{violation.node}/findings", "finding", {**about, "event": violation.index})
@@ -235,7 +235,7 @@ class Recorder:
             self._channels[topic] = self._writer.register_channel(topic, "json", self._schema(schema))
         number = self._counts[topic] = self._counts.get(topic, 0) + 1
         data = json.dumps(message).encode()
-        self._logged = max(self._logged, self._latest)  # what is said later is logged later, of whatever event it is
+        self._logged = max(self._logged, self._latest)  # log times do not go back, whatever event a message is about
         self._writer.add_message(self._channels[topic], self._logged, data, self._latest, number % 2**32)
 
     def _schema(self, name: str) -> int:

@@ -1,4 +1,4 @@
-"""The timeline of a judged trace: the signals that its clauses speak of, and where something was wrong."""
+"""The timeline of a judged trace: the signals that its clauses speak of, and where a fault was found."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ _KINDS = {
 
 @dataclass(slots=True)
 class Marks:
-    """Where something was wrong: (node, clause or variable) → marks by kind, bounded however many there are."""
+    """Where a fault was found: (node, clause or variable) → marks by kind; their number is bounded."""
 
     found: dict[tuple[str, str], dict[str, pictures.Columns[pictures.Mark]]] = field(default_factory=dict)
 
@@ -47,7 +47,7 @@ class Marks:
         columns.setdefault(kind, pictures.Columns(pictures.joined_marks)).put(at, mark)
 
     def events(self) -> frozenset[int]:
-        """Where they begin."""
+        """The events at which they begin."""
         return frozenset(mark.first for kinds in self.found.values() for c in kinds.values() for mark in c.items())
 
     def of(self, node: str, name: str) -> tuple[pictures.Mark, ...]:
@@ -56,7 +56,7 @@ class Marks:
 
 @dataclass(frozen=True, slots=True)
 class Signals:
-    """What a trace said of some variables, (node, variable) → its stretches."""
+    """The values of some variables in a trace, (node, variable) → its stretches."""
 
     found: Mapping[tuple[str, str], tuple[pictures.Stretch, ...]]
     start: str
@@ -67,8 +67,8 @@ class Signals:
 def signals(
     setups: Iterable[Setup], path: Path, where: Origin, events: int, marks: Marks, listens: Callable[[str], bool]
 ) -> Signals:
-    """Read a trace of so many events once more, for its values; `listens` as when it was judged. Of a long one, about
-    one event in so many is read, and those where the marks begin. Raises Rejected."""
+    """Read a trace of `events` events once more, for its values; `listens` as when it was judged. If it is long, only a
+    sample of the events is read, and those at which the marks begin. Raises Rejected."""
     every = max(1, -(-events // TIMELINE_EVENTS))
     readers: dict[str, list[tuple[Setup, str, Sort, Reader]]] = {}
     for setup in setups:
@@ -132,5 +132,5 @@ def _said(value: Value, sort: Sort, at: int) -> pictures.Stretch:
 
 
 def _chosen(index: int, every: int) -> bool:
-    """By a hash of the number: topics that take turns would fall in step with a plain count."""
+    """Whether an event is sampled, by a hash of its number: a plain count would be in phase with alternating topics."""
     return every == 1 or (index * 2654435761 >> 16) % every == 0

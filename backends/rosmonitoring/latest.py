@@ -1,10 +1,10 @@
-"""What a monitor does with a clause that is judged by the latest values.
+"""How a monitor judges a clause by the latest values.
 
 A node promises nothing once one of its assumptions was broken (`SoFar`). On a running graph each topic has its own
-connection: what is heard first need not have been said first. So there a breach by the order of arrival waits until
-what was heard within `LIVE_APART` of it is known (`Doubts`), and is told where it is one whichever of these messages of
-other topics came before it; else it is undecided. What its clause remembers of steps hangs on all that came before:
-where that is of several topics, a breach is undecided.
+connection: the message received first may not have been published first. So there a breach by the order of arrival
+waits until the messages within `LIVE_APART` of it are known (`Doubts`), and is reported if it is one whichever of these
+messages of other topics came before it; otherwise it is undecided. A clause's memory of steps depends on all earlier
+messages: if these are of several topics, a breach is undecided.
 """
 
 from __future__ import annotations
@@ -34,16 +34,16 @@ class SoFar:
     """Whether the assumptions of a node that remembers have held so far: it promises nothing once one was broken."""
 
     jitter: Fraction
-    """By which a clock may go back."""
+    """Seconds by which a clock may go back."""
     broken: str = ""
     unsure: bool = False
-    """A message of an assumption was not seen, or nobody could tell whether one held."""
+    """A message of an assumption was not seen, or it could not be decided whether one held."""
     newest: Fraction | None = None
-    """The latest time of a message, in the run that goes on."""
+    """The latest time of a message, in the current run."""
 
     def hears(self, now: Fraction, timed: Sequence[Watched]) -> None:
-        """A message has come. Where times go back further than a clock does, a run begins anew for all clauses at once:
-        were it for each at its own next step, an assumption broken between would be forgotten."""
+        """A message has come. If times go back further than a clock does, a new run begins for all clauses at once: if
+        it began for each at its own next step, an assumption broken in between would be forgotten."""
         if self.newest is not None and now < self.newest - self.jitter:
             self.broken, self.unsure, self.newest = "", False, now
             for watched in timed:
@@ -52,7 +52,7 @@ class SoFar:
         self.newest = now if self.newest is None else max(now, self.newest)
 
     def note(self, watched: Watched) -> None:
-        """A clause was judged: an assumption?"""
+        """A clause was judged; only assumptions count."""
         if watched.clause.kind is not ClauseKind.ASSUMPTION:
             return
         if watched.truth is False:
@@ -64,7 +64,7 @@ def _blamed(
     watched: Watched, truth: bool | None, assumptions: Sequence[Watched], values: Mapping[str, Value], solver: bool,
     so_far: SoFar | None = None, event: int = 0,
 ) -> tuple[Fault, str] | None:  # fmt: skip
-    """Whose fault it is that a clause does not hold, and what is said; None where nobody can tell."""
+    """The fault of a clause that does not hold, and the explanation; None if it cannot be decided."""
     if truth is None:
         return None
     said = watched.said
@@ -79,7 +79,7 @@ def _blamed(
             return Fault.EXCUSED, f"{said}; but the assumption {assumed.clause.name} does not hold"
     if so_far is not None and so_far.broken:
         return Fault.EXCUSED, f"{said}; but the assumption {so_far.broken} did not hold before"
-    # an assumption about the node's own answers is judged with the answer, of which a part may be missing
+    # an assumption about the node's own answers is judged with the answer, whose parts may be incomplete
     late = (a.steps for a in assumptions if a.steps is not None and a.steps.answers and a.steps.stepped != event)
     return None if so_far is not None and (so_far.unsure or any(late)) else (Fault.GUARANTEE, said)
 
@@ -87,7 +87,7 @@ def _blamed(
 def verdict_of(
     watched: Watched, assumptions: Sequence[Watched], values: Mapping[str, Value], solver: bool
 ) -> Fault | str | None:
-    """Whether a clause that remembers nothing held of values; None where nobody can tell."""
+    """Whether a clause without memory held for the values; None if it cannot be decided."""
     truth = watched.truth_of(values, solver)
     blame = None if truth else _blamed(watched, truth, assumptions, values, solver)
     return "held" if truth else blame and blame[0]
@@ -96,7 +96,7 @@ def verdict_of(
 def judge_latest(
     monitor: Monitor, watched: Watched, event: Mapping[str, Any], found: list[Violation], answer: Answer | None
 ) -> None:
-    """Judge a clause at an event; `answer`: the parts of the answer, where they came apart."""
+    """Judge a clause at an event; `answer`: the parts of the answer, if they came apart."""
     values, steps, tally = monitor.known(watched, answer), watched.steps, watched.tally
     missing = [name for name in watched.names if name not in values]
     supposed = any(name in monitor.supposed for name in watched.names)
@@ -114,11 +114,11 @@ def judge_latest(
     else:
         if missing and steps.early(watched.names, values):
             if steps.unsaid:
-                tally.published -= 1  # what it responds to, which has no value yet, did not come about
+                tally.published -= 1  # the trigger, which has no value yet, did not occur
             else:
                 tally.too_early(missing)
             if steps.answers or steps.stepped:
-                monitor.lose(watched)  # a step went by; of inputs alone, the run begins when all have a value
+                monitor.lose(watched)  # a step passed; with inputs alone, the run begins when all have a value
             return
         lost = steps.lost
         steps.comes(time_of(event))
@@ -147,7 +147,7 @@ def not_met(
     monitor: Monitor, watched: Watched, values: Mapping[str, Value], event: Mapping[str, Any], found: list[Violation],
     late: str = "",
 ) -> None:  # fmt: skip
-    """A clause does not hold of the latest values, or nobody can tell."""
+    """A clause does not hold for the latest values, or cannot be decided."""
     tally = watched.tally
     if monitor.doubts is not None and monitor.doubts.ask(monitor, watched, values, event):
         return
@@ -173,20 +173,20 @@ class Doubts:
     """The breaches of one node that wait."""
 
     pairing: Pairing
-    """The messages of each variable, and the breaches, as answers that may have answered any of those."""
+    """The messages of each variable, and the breaches, treated as answers that may have answered any of those."""
     latest: int = 0
     """The event of the latest guarantee that was not met."""
 
     @staticmethod
     def beginning(values: Mapping[str, Value]) -> Doubts:
-        """`values`: what is known before any message."""
+        """`values`: those known before any message."""
         pairing = Pairing(Answers("latency", jitter=LIVE_APART))
         for name, value in values.items():
             pairing.saw(name, -1, -1.0, None, value, 0)
         return Doubts(pairing)
 
     def ask(self, monitor: Monitor, watched: Watched, values: Mapping[str, Value], event: Mapping[str, Any]) -> bool:
-        """Whether a breach is not told yet."""
+        """Whether a breach is not reported now."""
         topic = same_topic(str(event.get("topic", "")))
         spoken = [n for n in dict.fromkeys(monitor.spoken(watched)) if n in values or n not in watched.names]
         rules = monitor.setup.rules

@@ -1,7 +1,7 @@
-"""What a clause that speaks of other steps remembers while it is monitored: the cells of `avow.formulas.temporal`.
+"""The memory of a clause that speaks of other steps: the state variables of `avow.formulas.temporal`.
 
-A step is a judgement of the clause. After one that went by unseen (a message was lost or unreadable, an answer was not
-whole), what is remembered is unknown until later steps determine it. Limits in seconds are judged between steps too.
+A step is a judgement of the clause. After a step that was not seen (a message was lost or unreadable, an answer was
+incomplete), the memory is unknown until later steps determine it. Limits in seconds are judged between steps too.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ from .word import untold
 
 
 class _Unknown:
-    """A value that nobody knows: whatever looks at it cannot be evaluated. Each is new, so that none is another's."""
+    """An unknown value: an operation on it cannot be evaluated. Each is a new object, so that no two are the same."""
 
     __slots__ = ()
 
@@ -53,7 +53,7 @@ class _Unknown:
         self._look()
 
 
-numbers.Rational.register(_Unknown)  # a Fraction of it asks for its numerator
+numbers.Rational.register(_Unknown)  # a Fraction of it reads its numerator
 
 
 Moments = Callable[[Mapping[str, Value]], Iterator[Value]]
@@ -61,26 +61,26 @@ Moments = Callable[[Mapping[str, Value]], Iterator[Value]]
 
 @dataclass(slots=True)
 class Silence:
-    """What a clause with limits in seconds is like between steps, and when its steps were."""
+    """A clause with limits in seconds between steps, and when its steps were."""
 
     holds: Mapping[Side, Callable[[Mapping[str, Value]], Value]]
-    """Whether it holds so many seconds (`ELAPSED`) after a step."""
+    """Whether it holds `ELAPSED` seconds after a step."""
     breaks: tuple[Moments, ...]
-    """How many seconds after a step it may change."""
+    """The numbers of seconds after a step at which its truth may change."""
     period: Fraction | None
-    """Of a clause that says that steps come every so many seconds."""
+    """For a clause that says that steps come periodically, the period in seconds."""
     leeway: Leeway
     latest: Fraction | None = None
-    """When its latest step was."""
+    """The time of its latest step."""
     elapsed: Fraction = Fraction(0)
     """The time from the latest step to the next, which is being judged."""
     told: bool = False
-    """That it was broken since, has been told."""
+    """Whether a breach since the latest step has been reported."""
     spared: Fraction | None = None
-    """Where the step that is being judged came a little after a deadline: the time to it, `elapsed` to the deadline."""
+    """If the step that is being judged came a little after a deadline: the time to it, `elapsed` to the deadline."""
 
     def broken(self, memory: Mapping[str, Value]) -> Fraction | None:
-        """How long after the latest step silence breaks the clause; None where it never does. Raises NotEvaluable."""
+        """The time after the latest step at which silence breaks the clause, or None. Raises NotEvaluable."""
 
         def at(side: Side, elapsed: Fraction) -> bool:
             return bool(self.holds[side]({**memory, ELAPSED.qualified: elapsed}))
@@ -101,8 +101,8 @@ class Silence:
 
 
 def _moments(at: Term) -> Moments:
-    """The values of a term over memory; where it hangs on quantified variables, at all that is remembered of these and
-    at values of which nothing is. They raise NotEvaluable."""
+    """The values of a term over memory; if it depends on quantified variables, at all remembered values of these and at
+    values that are not remembered. The returned function raises NotEvaluable."""
     value = compile_term(at)
     bound = sorted({v for v in free_variables(at) if v.role is Role.BOUND}, key=lambda v: v.name)
     if not bound:
@@ -127,7 +127,7 @@ def _moments(at: Term) -> Moments:
 
 
 class Memory:
-    """What one clause remembers."""
+    """The memory of one clause."""
 
     def __init__(
         self, cells: tuple[Cell, ...], formula: Term, waiting: Term | None, silence: Silence | None,
@@ -136,23 +136,23 @@ class Memory:
         self.formula = formula
         """The clause as a formula of one step."""
         self.open = False
-        """After the latest step, a response is demanded of later ones (or may be)."""
+        """After the latest step, a response is required of later ones (or may be)."""
         self.lost = False
-        """Steps went by unseen, and not all is known again."""
+        """Steps were not seen, and the memory is not completely known again."""
         self.alone = False  # it speaks of arrivals alone
         self.every = False
-        """Its steps are all messages of what it speaks of: a node that dies would never see what it has to answer."""
+        """Its steps are all messages of its variables: if they were the node's answers, a dead node would have none."""
         self.answers = False  # its steps are answers of the node
         self.unsaid = frozenset[str]()
-        """The outputs of a response to inputs: as long as one of them was never heard, it has not come."""
+        """The outputs of a response to inputs: while one of them was never received, the response has not come."""
         self.mute = False
-        """One was never heard: that it did not come may be for want of a record of its topic."""
+        """One was never received: the response may be missing because its topic was not recorded."""
         self.stepped = 0
         """The event of its latest step."""
         self.broke = False
-        """It was broken there, which is told, and need not be told of the silence that begins with it."""
+        """It was broken there, which is reported; the silence that begins with it need not be reported."""
         self.awaits = self.missed = False
-        """It wants something within a limit, which did not come in time (that is told) and has not come since."""
+        """It requires a response within a limit, which did not come in time (reported) and has not come since."""
         self.judged: Mapping[str, Value] = {}
         """The valuation of that step."""
         self.silence = silence
@@ -162,25 +162,25 @@ class Memory:
         self._leeway = leeway
         self._waiting = None if waiting is None else compile_term(waiting)
         self._breaks: tuple[Mapping[str, Value], Fraction | None] | None = None
-        """Of what it last remembered, how long after the latest step silence breaks it."""
+        """The latest memory, and the time after the latest step at which silence breaks it."""
         self._cells = {cell.before.qualified for cell in cells}
         whole = not any(_quantified(term) for term in (formula, *(cell.now for cell in cells)))
         plain = (BOOL, INTEGER, NATURAL, REAL)
         self._open = {c.before.qualified for c in cells if c.sort in plain} if whole else set[str]()
-        """What may be unknown in a formula that is evaluated: where it does not matter, the formula is decided."""
+        """The state variables that may be unknown when a formula is evaluated: if they do not matter, it is decided."""
 
     @property
     def unknown(self) -> str:
-        """Why something of what it remembers has no value; empty where all has one."""
+        """Why a part of the memory has no value; empty if all parts have one."""
         missing = self._cells - self._keeper.memory.keys()
         return (self._keeper.why or "what the steps before have left is not known") if missing else ""
 
     def known(self, values: Mapping[str, Value]) -> dict[str, Value]:
-        """A step's valuation, of what is known."""
+        """The known part of a step's valuation."""
         return self._keeper.at(self._around(values))
 
     def _around(self, values: Mapping[str, Value]) -> Mapping[str, Value]:
-        """With the time since the step before, and what has arrived since."""
+        """The values with the time since the step before, and the arrivals since."""
         arrived = {name: port in self._arrived for name, port in self._arrivals.items()}
         if self.unsaid:
             missing: dict[str, Any] = {name: _Unknown() for name in self.unsaid if name not in values}
@@ -191,7 +191,7 @@ class Memory:
         return {**values, **arrived, CLOCK.qualified: self.silence.elapsed}
 
     def early(self, names: Iterable[str], values: Mapping[str, Value]) -> bool:
-        """Whether something that it speaks of has no value yet; of a response that never came, that is none."""
+        """Whether a variable that it speaks of has no value yet, except outputs of a response that never came."""
         return any(name not in values and name not in self.unsaid for name in names)
 
     def hears(self, names: Iterable[str]) -> None:
@@ -207,7 +207,7 @@ class Memory:
         self.silence.latest = now
 
     def late(self, now: Fraction) -> Fraction | None:
-        """When silence has broken the clause, long enough ago that no message on its way matters; told once."""
+        """The time at which silence broke the clause, if no message under way matters any more; returned once."""
         silence = self.silence
         if silence is None or silence.told or silence.latest is None or self.lost:
             return None
@@ -219,7 +219,7 @@ class Memory:
 
     @property
     def deadline(self) -> Fraction | None:
-        """When silence breaks the clause, unless a step comes before."""
+        """The time at which silence breaks the clause, unless a step comes before; None if it does not."""
         silence = self.silence
         if silence is None or silence.latest is None or silence.told:
             return None
@@ -250,7 +250,7 @@ class Memory:
         silence.told = False
 
     def restart(self) -> None:
-        """A run begins anew: what waited is cut."""
+        """A new run begins: pending responses are dropped."""
         self._keeper.restart()
         self._arrived.clear()
         self.lost = self.open = self.missed = False
@@ -258,7 +258,7 @@ class Memory:
             self.silence.latest, self.silence.elapsed, self.silence.told = None, Fraction(0), False
 
     def at(self, values: Mapping[str, Value]) -> dict[str, Any]:
-        """A step's valuation, in which what is not known cannot be looked at."""
+        """A step's valuation, in which operations on unknown values cannot be evaluated."""
         known = self.known(values)
         return {**{name: _Unknown() for name in self._open if name not in known}, **known}
 
@@ -280,7 +280,7 @@ class Memory:
     def step(
         self, watched: Watched, values: Mapping[str, Value], solver: bool, event: int, supposed: bool
     ) -> bool | None:
-        """The clause at a step, which is then over. What an initial value of the plan says is not remembered."""
+        """Judge the clause at a step, which is then over. Initial values of the plan are not remembered."""
         truth = watched.truth_of(values, solver)
         if self.silence is not None and self.silence.spared is not None:
             self.silence.elapsed, self.silence.spared = self.silence.spared, None
@@ -298,7 +298,7 @@ class Memory:
         return truth
 
     def forget(self) -> None:
-        """A step went by unseen."""
+        """A step was not seen."""
         self.lost, self.open = True, self._waiting is not None
         self._keeper.memory = {}
 
@@ -307,7 +307,7 @@ MUTE = "a response is due of which no message was ever heard: its topic may not 
 
 
 def watch(clause: Clause, tally: Tally, setup: Setup) -> Watched:
-    """A clause under watch. Raises NotEvaluable where nothing can judge it."""
+    """A clause under watch. Raises NotEvaluable if it cannot be judged."""
     formula, trigger, steps = clause.formula, trigger_of(clause.formula), None
     names = set[str]()
     if histories(formula):
@@ -351,7 +351,7 @@ def watch(clause: Clause, tally: Tally, setup: Setup) -> Watched:
         steps.alone = bool(arrivals) and names == set(map(_port_of, arrivals))
         if clause.pace is not None:  # its steps are the node's answers
             names = {n for n in setup.rules if n.startswith(f"{Role.OUTPUT}.") and n not in setup.hidden}
-        # as it was written: what it is compiled to has names of our own
+        # as it was written: the compiled formula has internal names
         clause = replace(clause, formula=formula, text=clause.text or show_term(clause.formula, "unicode"))
     return Watched(
         clause,
@@ -365,7 +365,7 @@ def watch(clause: Clause, tally: Tally, setup: Setup) -> Watched:
 
 
 def triggers_of(setup: Setup, names: tuple[str, ...], *, every: bool = False) -> tuple[str, ...]:
-    """The variables whose publication makes a clause judged, of those that it speaks of."""
+    """Those of a clause's variables whose publication triggers its judgement."""
     carried = setup.carried
     direct = tuple(n for n in names if n in carried)
     outputs = tuple(n for n in direct if n.startswith(f"{Role.OUTPUT}."))
@@ -379,9 +379,9 @@ def watching(
     setup: Setup, clause: Clause, tally: Tally, previous: Sequence[tuple[str, str]], values: Mapping[str, Value],
     pairs: bool,
 ) -> tuple[Watched, tuple[str, ...]] | None:  # fmt: skip
-    """A node's clause under watch, and the variables whose publication makes it judged; None, with the reason in the
-    tally, where nothing can judge it. `previous`: (variable, its source) of what is a step before; `pairs`: answers are
-    paired with their inputs."""
+    """A node's clause under watch, and the variables whose publication triggers its judgement; None, with the reason in
+    the tally, if it cannot be judged. `previous`: (variable, its source) for values of the step before; `pairs`:
+    whether answers are paired with their inputs."""
     try:
         if reason := unmonitored(setup, clause):
             raise NotEvaluable(reason)
@@ -413,8 +413,7 @@ def watching(
 
 
 def unmonitored(setup: Setup, clause: Clause) -> str:
-    """Why a clause that speaks of other steps, or one whose node's assumptions do, is not monitored; empty where it
-    is."""
+    """Why a clause that speaks of other steps, or one whose node's assumptions do, is not monitored; empty if it is."""
     for about in dict.fromkeys((clause, *setup.node.assumptions)):
         if not histories(about.formula):
             continue
@@ -441,8 +440,8 @@ def hear(remembering: Iterable[Watched], names: Iterable[str]) -> None:
 
 
 def overdue(timed: Sequence[Watched], event: Mapping[str, Any]) -> list[tuple[Watched, Fraction]]:
-    """The clauses that silence has broken by the time of an event, and when it did, the first first (of the same time:
-    assumptions); each told once."""
+    """The clauses that silence has broken by the time of an event, with the time of the breach, in order of time (at
+    the same time: assumptions first); each is reported once."""
     now = time_of(event) if timed else Fraction(0)
     found: list[tuple[Watched, Fraction]] = []
     for watched in timed:
@@ -462,19 +461,19 @@ def soonest(timed: Sequence[Watched]) -> float:
 
 
 def _answers_inputs(formula: Term) -> bool:
-    """Whether a clause demands something of later positions, by a trigger about inputs only."""
+    """Whether a clause requires something of later positions, by a trigger about inputs only."""
     found = due(formula)
     spoken = {v.role for t in found.triggers for v in free_variables(t)} if found is not None else set()
     return Role.INPUT in spoken and Role.OUTPUT not in spoken
 
 
 ANSWERED = Variable(Role.INPUT, f"answered{CELL}", BOOL)
-"""Whether all that a response speaks of has been heard."""
+"""Whether every variable of a response has been received."""
 
 
 def _unsaid(formula: Term) -> frozenset[str]:
-    """The outputs of a response to inputs, which may never have been heard; none of one under a quantifier: there no
-    part of a formula may be unknown."""
+    """The outputs of a response to inputs, which may never have been received; empty for one under a quantifier: there,
+    no part of a formula may be unknown."""
     found = responding(formula)
     within = found is not None and found[2].operator is Past.WITHIN  # the others are due at once
     if found is None or not within or _quantified(formula) or not _answers_inputs(formula):
@@ -484,7 +483,7 @@ def _unsaid(formula: Term) -> frozenset[str]:
 
 
 def _once_said(formula: Term) -> Term:
-    """A response that has to have been heard: a claim without a value is not met."""
+    """A response that must have been received: a claim without a value is not met."""
     if isinstance(formula, Implies):
         return Implies(formula.left, _once_said(formula.right), formula.span)
     assert isinstance(formula, History)
@@ -492,7 +491,7 @@ def _once_said(formula: Term) -> Term:
 
 
 def _port_of(arrival: Variable) -> str:
-    """``in.scan``, of whether a message of it has arrived."""
+    """``in.scan``, for the variable that records whether a message of it has arrived."""
     return f"in.{arrival.name.removeprefix('arrived ').removesuffix(CELL)}"
 
 

@@ -1,5 +1,5 @@
-"""One entry of the plan's `mapping`, and the definition of the topic's messages, as a rule for a variable. Of the two
-ends of a link: an input is read as the outputs that it hears."""
+"""One entry of the plan's `mapping`, and the definition of the topic's messages, as a rule for a variable. An input is
+read in the same way as the outputs that it is linked to."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from .wires import MappingError, converter, fits, parts_of
 
 
 class Wrong(Exception):  # noqa: N818 - it is what was found wrong
-    """A fault of the plan; `path` leads from the variable's entry to its place."""
+    """An error in the plan; `path` leads from the variable's entry to its place."""
 
     def __init__(self, message: str, *path: str | int, hint: str | None = None) -> None:
         super().__init__(message)
@@ -41,7 +41,7 @@ class Observed:
     port: Port
     topic: str
     message: Message | str
-    """Its definition; the type's name where nothing defines it."""
+    """Its definition, or the type's name if nothing defines it."""
     known: Definitions
 
     @property
@@ -50,12 +50,12 @@ class Observed:
 
     @property
     def kind(self) -> str:
-        """The type of the topic's messages, as far as it is said."""
+        """The type of the topic's messages, as far as it is known."""
         return self.message if isinstance(self.message, str) else self.message.name
 
 
 def observe(at: Observed, entry: Mapping[str, Any]) -> Rule | str:
-    """The rule, or why the variable cannot be observed. Raises Wrong, and Undecided where fields have to be named."""
+    """The rule, or why the variable cannot be observed. Raises Wrong, and Undecided if the plan must name fields."""
     sort, variable = at.port.sort, at.variable
     if isinstance(sort, s.OpaqueSort):
         return f"{variable.qualified} is of an unspecified sort"
@@ -92,7 +92,7 @@ def _paths(entry: Mapping[str, Any], sort: s.Sort) -> tuple[FieldPath, ...]:
     key = "field" if "field" in entry else "fields"
     paths = tuple(map(path, [entry["field"]] if key == "field" else entry["fields"]))
     wanted = len(parts_of(sort))
-    if isinstance(sort, s.TupleSort) and len(paths) > 1:  # a field for each part; one field holds them all
+    if isinstance(sort, s.TupleSort) and len(paths) > 1:  # one field for each part, or one for all of them
         wanted = len(sort.items)
     if len(paths) != wanted:
         raise Wrong(f"{wanted} field{'s are' if wanted > 1 else ' is'} wanted, not {len(paths)}", "fields")
@@ -111,7 +111,7 @@ def _decided(at: Observed, entry: Mapping[str, Any]) -> tuple[FieldPath, ...]:
 def _wires(
     at: Observed, paths: tuple[FieldPath, ...], each: FieldPath | None, entry: Mapping[str, Any], take: Take | None
 ) -> tuple[tuple[Wire | None, ...], Mapping[str, str]]:
-    """What each field is, by the definition, and what the message's words and numbers mean. Raises Wrong."""
+    """The type of each field by the definition, and the meaning of the message's words and numbers. Raises Wrong."""
     names: dict[str, str] = dict(entry.get("values", {}))
     enums = (part for part in s.components(at.port.sort) if isinstance(part, s.EnumSort))
     _check_crossed(names, [member for part in enums for member in part.members])
@@ -168,7 +168,7 @@ def _check_words(
 
 
 def _check_crossed(names: Mapping[str, str], elements: Sequence[str]) -> None:
-    """A word that is an element's own name means that element."""
+    """A word that is an element's own name means that element. Raises Wrong."""
     own = {element.casefold(): element for element in elements}
     for word, element in names.items():
         meant = own.get(word.casefold(), element)
@@ -188,7 +188,7 @@ def _check_take(way: FieldPath, wire: Wire, sort: s.Sort, take: Take, known: Def
 
 
 def _check_gaps(rule: Fields) -> None:
-    """*No reading* has to be something that the contract can speak of. Raises Wrong."""
+    """*No reading* has to be expressible in the contract. Raises Wrong."""
     sort = rule.variable.sort
     if (rule.gaps or rule.take in (Take.MIN, Take.MAX)) and rule.wires == ():
         key = "take" if rule.take else next(iter(rule.gaps)).value
@@ -295,11 +295,11 @@ _FIELD_KEYS = (
 )  # fmt: skip
 _FUNCTION_KEYS = ("each", "hold")
 _NAMED = (s.EnumSort, s.DataSort, s.StringSort)
-"""The types of which a value may have a name of its own in a message."""
+"""The sorts whose values may have names of their own in a message."""
 
 
 def check_keys(entry: Mapping[str, Any], sort: s.Sort) -> None:
-    """Refuses what would be passed over in silence. Raises Wrong."""
+    """Refuses keys that would have no effect. Raises Wrong."""
     for key in entry:
         if key not in _FIELD_KEYS:
             raise Wrong(f"there is no {key!r} here", key, hint=suggest(key, _FIELD_KEYS))
@@ -347,12 +347,12 @@ NAME = "rosmonitoring"
 
 
 def method_of(system: System, node: str) -> Located | None:
-    """The options of a node's (first) monitors."""
+    """The options of the first method of this backend for a node."""
     return next((m.options for m in system.plan.node(node).methods if m.backend == NAME), None)
 
 
 def said(options: Located | None) -> Mapping[str, Any]:
-    """What a method's options say; nothing of a method that is not there."""
+    """The data of a method's options; empty if there is no such method."""
     return options.data if options is not None and isinstance(options.data, Mapping) else {}
 
 
@@ -362,7 +362,7 @@ def mapping_of(options: Located | None) -> Mapping[str, Any]:
 
 
 def recordings(options: Located | None) -> dict[str, str]:
-    """The traces that a method names, in order, each with its digest where the plan says it, else nothing."""
+    """The traces that a method names, in order, each with its digest if the plan has it, otherwise an empty text."""
     named = said(options).get("traces")
     found: dict[str, str] = {}
     for entry in named if isinstance(named, list) else ():
@@ -375,7 +375,7 @@ def recordings(options: Located | None) -> dict[str, str]:
 
 
 def sources(system: System, node: Node, port: str) -> list[Endpoint]:
-    """The outputs that an input hears: of a topic with several publishers, one of each."""
+    """The outputs that an input receives: one of each publisher, if the topic has several."""
     try:
         graph = dataflow(system)
     except Rejected:
@@ -386,7 +386,7 @@ def sources(system: System, node: Node, port: str) -> list[Endpoint]:
 
 
 def published(system: System, node: Node, port: str) -> Any:
-    """What the plan says of the outputs that an input hears, without first values. Raises Wrong, where these are read
+    """The plan's entry for the outputs that an input receives, without initial values. Raises Wrong if these are read
     in different ways."""
     found: dict[str, tuple[Endpoint, Any]] = {}
     for source in sources(system, node, port):

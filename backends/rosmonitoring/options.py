@@ -1,4 +1,4 @@
-"""The plan's options as rules for every variable of a node; every problem has its place in the plan."""
+"""The plan's options as rules for every variable of a node; every error has its place in the plan."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ from .wires import MappingError, parts_of, table_of, whole
 
 @dataclass(frozen=True, slots=True)
 class Setup:
-    """How one node is observed. `hidden`: variables that nothing lets us observe, and why."""
+    """How one node is observed. `hidden`: variables that cannot be observed, and why."""
 
     node: Node
     rules: Mapping[str, Rule]
@@ -47,29 +47,29 @@ class Setup:
     known: Definitions = NOTHING_KNOWN
     """The message types."""
     answers: Answers | None = None
-    """Which input an answer answered; None: nobody has said."""
+    """How answers are paired with inputs; None: not specified."""
     decided: float = DECIDED_SHARE
-    """The share of what was published that has to be decided before a run is evidence."""
+    """The share of publications that has to be decided before a run is evidence."""
     named: tuple[tuple[str, str], ...] = ()
-    """The contract's topics, by their whole names, and their types."""
+    """The contract's topics, by their full names, and their types."""
     fresh: Mapping[str, Fraction] = field(default_factory=dict)
     """How long each of these variables may be silent, in seconds."""
     rates: Mapping[str, Rate] = field(default_factory=dict)
-    """How often each of these variables has to come."""
+    """The rate at which each of these variables has to come."""
     max_age: Fraction | None = None
-    """How old the inputs of an answer may be, for it to be evidence."""
+    """The greatest age in seconds of an answer's inputs at which it is evidence."""
     losses: int | None = None
-    """How many messages may have been lost; None: however many."""
+    """The number of messages that may have been lost; None: any number."""
     filtered: frozenset[str] = frozenset()
     """The topics (without their leading slash) whose messages a filter passes on only while nothing is broken."""
     leeway: Leeway = field(default_factory=Leeway)
     time: By = By.RECEIPT
-    """By which clock its messages come."""
+    """The clock by which its messages are timed."""
     shared: Mapping[str, tuple[str, tuple[str, ...]]] = field(default_factory=dict)
-    """Each output whose topic other nodes publish too: this node, and all of them, by their whole names."""
+    """Each output whose topic other nodes publish too: this node, and all of them, by their full names."""
 
     def whose(self, name: str, event: Event) -> bool | None:
-        """Whether an event's message is the node's own, where it carries a variable; None where that is not known."""
+        """Whether an event's message is the node's own, for a variable that it carries; None if that is not known."""
         if name not in self.shared:
             return True
         own, known = self.shared[name]
@@ -83,7 +83,7 @@ class Setup:
 
     @property
     def kinds(self) -> dict[str, str]:
-        """The types of the topics that are listened to (without their leading slash), as far as they are said."""
+        """The types of the topics that are listened to (without their leading slash), as far as they are known."""
         return {same_topic(rule.topic): rule.kind for rule in self.carried.values() if rule.kind}
 
     @property
@@ -101,7 +101,7 @@ def setup(
     system: System, node: Node, options: Located | None, known: Definitions | None = None
 ) -> tuple[Setup, tuple[Diagnostic, ...]]:
     """The rules for a node, by the plan's options, the contract's topics, the messages' definitions, the connections
-    and the scenario. `known`: the definitions, where they have been read already."""
+    and the scenario. `known`: the definitions, if they have been read already."""
     wrong: tuple[Diagnostic, ...] = ()
     if known is None:
         known, wrong = known_types(system, _traces_of(system, options))
@@ -125,7 +125,7 @@ def setup(
 
 
 def usable(system: System, node: Node, options: Located | None) -> Setup:
-    """As `setup`. Raises Rejected for what is wrong."""
+    """As `setup`. Raises Rejected if there are errors."""
     made, faults = setup(system, node, options)
     if faults:
         raise Rejected(*faults)
@@ -133,13 +133,13 @@ def usable(system: System, node: Node, options: Located | None) -> Setup:
 
 
 def origin(system: System) -> Origin:
-    """What the plan says of message types."""
+    """The plan's sources of message types."""
     return Origin(system.plan.ros.distro, system.plan.messages)
 
 
 def known_types(system: System, traces: Iterable[Path]) -> tuple[Definitions, tuple[Diagnostic, ...]]:
-    """The message types that the plan's files, its distribution and the bags among some traces define. What cannot be
-    read is left to who judges the trace."""
+    """The message types that the plan's files, its distribution and the bags among some traces define. Unreadable bags
+    are left to the judging of the trace."""
     known, wrong = definitions(system.plan.messages, system.plan.ros.distro)
     for path in traces:
         if is_bag(path):
@@ -151,13 +151,13 @@ def known_types(system: System, traces: Iterable[Path]) -> tuple[Definitions, tu
 
 
 def _traces_of(system: System, options: Located | None) -> tuple[Path, ...]:
-    """The traces that a method names and that are there."""
+    """The traces that a method names and that exist."""
     paths = (inside(system.plan.root, name) for name in observing.recordings(options))
     return tuple(path for path in paths if path is not None and path.exists())
 
 
 def resolved(system: System, node: Node, topic: str) -> str:
-    """The topic's whole name when the robot runs; as it is written where only the first slash is missing."""
+    """The topic's full name when the robot runs; as it is written if only the first slash is missing."""
     whole = system.plan.ros.names.topic(node.name, topic)
     return topic if whole == f"/{topic}" else whole
 
@@ -168,7 +168,7 @@ def _called(system: System, node: Node, topic: Topic) -> str:
 
 
 def same_topic(name: str) -> str:
-    """A topic's name without the leading slash: ROS's names are resolved, the contract's need not be."""
+    """A topic's name without the leading slash: ROS's names are resolved, the contract's may not be."""
     return name.lstrip("/")
 
 
@@ -193,7 +193,7 @@ class _Work:
                 self.fault(f"{self.node.name} has no variable {name!r}", name, hint=suggest(name, sorted(known)))
 
     def duration(self, place: str, written: Any) -> Fraction:
-        """A time of the options, in seconds; 0 with a fault where it is none."""
+        """A time of the options, in seconds; 0 with a recorded error if it is none."""
         try:
             return duration(str(written))
         except (ValueError, KeyError):
@@ -227,7 +227,7 @@ class _Work:
         return {name: self.duration(f"fresh.{name}", entry[name]) for name in self.heard("fresh", entry)}
 
     def rates(self, entry: Any) -> dict[str, Rate]:
-        """How often variables have to come."""
+        """The rates at which variables have to come."""
         found: dict[str, Rate] = {}
         for name in self.heard("rate", entry):
             written = RATE.fullmatch(str(entry[name]))
@@ -239,7 +239,7 @@ class _Work:
         return found
 
     def filtered(self) -> frozenset[str]:
-        """The topics of the outputs that are filtered: messages have to carry these."""
+        """The topics of the outputs that are filtered: messages must carry these."""
         names = observing.said(self.options).get("filter", ())
         outputs = {n: r for n, r in self.rules.items() if n.startswith("out.") and isinstance(r, Fields | Choice)}
         for at, name in enumerate(names):
@@ -249,7 +249,7 @@ class _Work:
         return frozenset(same_topic(outputs[name].topic) for name in names if name in outputs)
 
     def heard(self, key: str, entry: Any) -> list[str]:
-        """The variables of an option that messages carry; the others are faults."""
+        """The variables of an option that messages carry; the others are errors."""
         observed = sorted(n for n, rule in self.rules.items() if isinstance(rule, Fields | Choice))
         for name in entry or ():
             if name not in observed:
@@ -262,7 +262,7 @@ class _Work:
         self.wrong(f"mapping.{where}: {message}", "mapping", *path, hint=hint)
 
     def wrong(self, text: str, *place: str | int, hint: str | None = None) -> None:
-        """A fault of the options, at its place in the plan."""
+        """Records an error in the options, at its place in the plan."""
         span = self.options.at(*place) if self.options is not None else None
         self.faults.append(Diagnostic("MON101", text, span, hint=hint))
 
@@ -281,7 +281,7 @@ class _Work:
             self.as_published(name, found)
 
     def as_published(self, name: str, rule: Rule) -> None:
-        """A link says that both ends have one value: they are read in one way."""
+        """A link states that both ends have one value: they must be read in the same way."""
         for source in (
             observing.sources(self.system, self.node, name.partition(".")[2]) if name in self.mapping() else ()
         ):
@@ -297,7 +297,7 @@ class _Work:
                 self.fault(text, name, hint=hint)
 
     def shared_fields(self) -> None:
-        """Refuses two inputs (or outputs) that are read from one field: what one of them means is then not said."""
+        """Refuses two inputs (or outputs) that are read from one field: the meaning of one is not specified."""
         taken: dict[tuple[str, FieldPath, Role], str] = {}
         for name, rule in self.rules.items():
             if not isinstance(rule, Fields) or name in self.mapping():
@@ -357,12 +357,12 @@ class _Work:
         return (None, None) if found is None else (_called(self.system, node, found), found.ros_type)
 
     def message(self, kind: str | None, entry: Mapping[str, Any]) -> Message | str:
-        """The definition of the messages of a topic; else the type's name, of which nothing is known."""
+        """The definition of the messages of a topic, or the type's name if it is not known."""
         kind = str(entry.get("type", kind or ""))
         return self.known.get(kind) or kind
 
     def asked(self, port: Port) -> bool:
-        """Whether a method of the plan is to judge a clause about it."""
+        """Whether a method of the plan judges a clause about it."""
         return self.options is not None and any(port.variable in free_variables(c.formula) for c in self.node.clauses)
 
     def interpretation(self, port: Port) -> tuple[str, tuple[str, ...]] | None:
@@ -390,8 +390,8 @@ class _Work:
         return Constant(port.variable, FunctionValue(table_of(points, port.sort), elsewhere))
 
     def wires(self, port: Port, entry: Any) -> tuple[Wire | None, ...]:
-        """The types in which a port's messages carry its values: a map of decimals, read by a node as binary numbers,
-        holds those."""
+        """The types in which a port's messages carry its values: a map of decimals that a node reads as binary numbers
+        has the latter as its values."""
         topic, kind = self.topic(self.node, port)
         fields = {k: v for k, v in entry.items() if k in ("fields", "type")} if isinstance(entry, Mapping) else {}
         if topic is None or not isinstance(self.message(kind, fields), Message):
@@ -425,7 +425,7 @@ class _Work:
         return next((e for e in graph.feeding(self.node.name) if e.target.port == port.name), None)
 
     def first(self, port: Port, edge: Edge) -> Value | None:
-        """A delayed edge's first value, if the plan fixes one: a value as text, or an empty relation's formula."""
+        """A delayed edge's first value, if the plan sets one: a value as text, or the formula of an empty relation."""
         if edge.initial is None:
             return None
         source = self.system.contract.node(edge.source.node)
@@ -438,7 +438,7 @@ class _Work:
                 value = evaluate(term, {})
             except NotEvaluable:
                 return None
-            # a number of whatever kind: 1 is a REAL's first value as well as 1.0
+            # any kind of number: 1 is a REAL's first value as well as 1.0
             return whole(value) if isinstance(port.sort, RealSort) and type(value) is int else value
         return FunctionValue({}, False) if _says_empty(term, edge.source.port) else None
 
@@ -455,5 +455,5 @@ def _says_empty(term: Term, port: str) -> bool:
             body=Not(body=Apply(function=Variable(role=Role.OUTPUT, name=name), arguments=arguments)),
         ):
             return name == port and arguments == variables
-        case _:  # not of the form that is looked for
+        case _:  # of another form
             return False

@@ -1,4 +1,4 @@
-"""What monitors cost a running robot, as somebody has measured it. It stands with the evidence, and is none."""
+"""The measured cost of monitors on a running robot. It is shown with the evidence, and is no evidence itself."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from avow.base.files import inside
 from avow.system.tables import read_csv
 
 NONE, ALL = "none", "all"
-"""Which monitors ran: none, all, or those of the node that is named."""
+"""Which monitors ran: none, all, or those of the named node."""
 
 
 @dataclass(frozen=True, slots=True)
 class Runs:
-    """Runs with the same monitors: how many, and after how many seconds on average they had reached each place."""
+    """Runs with the same monitors: their number, and the mean time in seconds at which they reached each place."""
 
     count: int
     means: tuple[float, ...]
@@ -30,7 +30,7 @@ class Runs:
 
 
 def overheads(job: Job) -> tuple[str, tuple[Diagnostic, ...]]:
-    """What the report says of what the monitors cost, and what is wrong with the tables that the plan names."""
+    """The report's text on the cost of the monitors, and the errors in the tables that the plan names."""
     said: list[str] = []
     wrong: list[Diagnostic] = []
     for at, entry in enumerate(job.options.get("overhead", ())):

@@ -1,4 +1,4 @@
-"""When the messages that a monitor hears come, by which clock, at which rate, and what was lost; whatever they say."""
+"""When the messages that a monitor receives come, by which clock, at which rate, and which were lost."""
 
 from __future__ import annotations
 
@@ -28,32 +28,32 @@ _UNITS = {"s": Fraction(1), "ms": Fraction(1, 1000), "us": Fraction(1, 10**6), "
 
 
 def duration(text: str) -> Fraction:
-    """``200 ms`` in seconds; the schema has seen to its form."""
+    """``200 ms`` in seconds; the schema has checked its form."""
     number = text.rstrip("abcdefghijklmnopqrstuvwxyz").strip()
     return Fraction(number) * _UNITS[text[len(text.rstrip("abcdefghijklmnopqrstuvwxyz")) :]]
 
 
 @dataclass(frozen=True, slots=True)
 class Leeway:
-    """What a monitor allows clocks and memory, where the plan says no other."""
+    """The tolerance of a monitor for clocks and memory, unless the plan sets another."""
 
     grace: Fraction = GRACE
-    """Seconds after a deadline until silence is told."""
+    """Seconds after a deadline until silence is reported."""
     jitter: Fraction = JITTER
-    """Seconds by which times may go back, and regular steps come early or late."""
+    """Seconds by which times may go back, and by which regular steps may be early or late."""
     instances: int = INSTANCES
-    """Values of a quantified variable for which something is remembered."""
+    """The number of values of a quantified variable for which something is remembered."""
 
     @property
     def late(self) -> str:
-        """What is said of an answer that came within the grace."""
+        """The message about an answer that came within the grace period."""
         by = f"{float(self.grace * 1000):g} ms"
         return f"an answer came after its deadline, by at most {by}: it may have been on its way"
 
 
 @dataclass(frozen=True, slots=True)
 class Rate:
-    """``10 Hz ± 20 %``: of any so many messages (`RATE_MESSAGES`), the time that they take lies within these bounds."""
+    """``10 Hz ± 20 %``: the time that any `RATE_MESSAGES` messages take lies within these bounds."""
 
     text: str
     least: Fraction
@@ -61,23 +61,23 @@ class Rate:
 
     @classmethod
     def of(cls, hertz: Fraction, share: Fraction, text: str) -> Rate:
-        """Raises ZeroDivisionError for a rate that allows none."""
+        """Raises ZeroDivisionError if `hertz` is 0 or `share` is 1."""
         return cls(text, RATE_MESSAGES / (hertz * (1 + share)), RATE_MESSAGES / (hertz * (1 - share)))
 
 
 @dataclass(slots=True)
 class Pace:
-    """How fast the messages of one variable come. Told once, until it is right again."""
+    """The rate of one variable's messages. A wrong rate is reported once, until it is right again."""
 
     rate: Rate
     start: Fraction
     times: deque[Fraction] = field(default_factory=lambda: deque(maxlen=RATE_MESSAGES))
-    """Of the latest messages."""
+    """The times of the latest messages."""
     slow: bool = False
     fast: bool = False
 
     def late(self, now: Fraction) -> str:
-        """What is wrong at a time, with or without a message then; empty where nothing new is."""
+        """What is wrong at a time, with or without a message then; empty if there is nothing new."""
         since = self.times[0] if len(self.times) == RATE_MESSAGES else self.start
         if self.slow or now - since <= self.rate.most:
             return ""
@@ -97,7 +97,7 @@ class Pace:
 
     @property
     def deadline(self) -> Fraction | None:
-        """When it is too slow unless a message comes; None where that has been told."""
+        """The time at which it is too slow unless a message comes; None if that has been reported."""
         if self.slow:
             return None
         return (self.times[0] if len(self.times) == RATE_MESSAGES else self.start) + self.rate.most
@@ -108,20 +108,20 @@ class Pace:
 
 @dataclass(slots=True)
 class Passage:
-    """What of one topic's messages got lost or came out of order, as far as they say."""
+    """The messages of one topic that were lost or came out of order, as far as their numbers show."""
 
     last: list[int] = field(default_factory=list)
-    """The latest `header.seq`, where there is one."""
+    """The latest `header.seq`, if there is one."""
     lost: int = 0
     disordered: int = 0
     uncounted: str = ""
-    """Why a loss need not show."""
+    """Why a loss may not be visible."""
     latest: Fraction | None = None
     alike: int = 1
-    """Messages so far that have the latest time, one after another."""
+    """The number of consecutive messages so far that have the latest time."""
     most_alike: int = 1
     advanced: bool = False
-    """Whether a message has had another time than the one before."""
+    """Whether any message had another time than the one before."""
 
     def heard(self, event: Event, now: Fraction) -> bool:
         """Whether messages before this one were lost, or come later, by their numbers (which may never be set)."""
@@ -141,18 +141,18 @@ class Passage:
             gap = number - self.last[0]
             self.lost += max(0, gap - 1)
             self.disordered += gap <= 0
-            if gap <= 0:  # never set, several publishers, or one that began anew
+            if gap <= 0:  # never set, several publishers, or one that restarted
                 self.uncounted = self.uncounted or "have numbers (header.seq) that do not rise"
         self.last[:] = [number]
         return number - before not in (0, 1)
 
 
 SEQUENCE = ("header", "seq")
-"""Where a message of ROS 1 has its number."""
+"""The path of a message's number in ROS 1."""
 
 
 def sequence(event: Event) -> int | None:
-    """A message's number among its publisher's."""
+    """A message's number among those of its publisher."""
     header = event.get("header")
     number = header.get("seq") if header.__class__ is dict else None
     return number if number.__class__ is int else None
@@ -160,22 +160,22 @@ def sequence(event: Event) -> int | None:
 
 @dataclass(slots=True)
 class Timing:
-    """When the messages of a monitor come: deadlines, rates, losses, and how long ago each variable was heard of."""
+    """When the messages of a monitor come: deadlines, rates, losses, and when each variable was last received."""
 
     fresh: Mapping[str, Fraction]
-    """How long each of these variables may be silent."""
+    """How long each of these variables may be silent, in seconds."""
     rates: Mapping[str, Rate]
     heard: dict[str, float] = field(default_factory=dict)
-    """When each variable was heard of last, in binary."""
+    """When each variable was last received, as a float."""
     paces: dict[str, Pace] = field(default_factory=dict)
     passages: dict[str, Passage] = field(default_factory=dict)
-    """By topic."""
+    """The passages by topic."""
     _since: dict[str, tuple[Fraction, bool]] = field(default_factory=dict)
-    """When each variable with a deadline was last heard of, and whether its silence has been told."""
+    """When each variable with a deadline was last received, and whether its silence has been reported."""
 
     def passes(self, event: Event, names: Set[str]) -> Iterator[tuple[str, str, bool]]:
-        """An event of whatever topic: time has passed. Deadlines do not wait for the next message: what is late is told
-        once, at the first event of the run that comes later (variable, what is wrong, whether it is silent)."""
+        """An event of any topic: time has passed. Deadlines do not wait for the next message: each missed one is
+        reported once, at the first later event of the run (variable, what is wrong, whether it is silent)."""
         if not self.fresh and not self.rates:
             return
         now = time_of(event)
@@ -199,7 +199,7 @@ class Timing:
 
     @property
     def standing(self) -> str:
-        """Why the messages' times are no evidence for limits in seconds, if so: they do not go on."""
+        """Why the messages' times are no evidence for limits in seconds (they do not advance); empty if they are."""
         again = {topic: p.most_alike for topic, p in self.passages.items() if p.most_alike > 1}
         still = {topic: n for topic, n in again.items() if n >= TIMES_ALIKE}
         if not still and again and not any(p.advanced for p in self.passages.values()):
@@ -209,15 +209,15 @@ class Timing:
         return f"{told}: such times say nothing of limits in seconds" if told else ""
 
     def hear(self, event: Event, topic: str, names: Iterable[str]) -> bool:
-        """A message of one of the monitor's topics; whether others before it were lost, or came out of order."""
+        """A message of one of the monitor's topics. Returns whether earlier ones were lost, or came out of order."""
         now = time_of(event)
         missed = self.passages.setdefault(topic, Passage()).heard(event, now)
         self.heard.update(dict.fromkeys(names, float(now)))
         return missed
 
     def caught_up(self, event: Event, topic: str, names: Iterable[str]) -> None:
-        """Take over the latest of some messages whose times were looked at elsewhere: each was later than the one
-        before it."""
+        """Take over the latest of some messages whose times were checked elsewhere: each was later than the one before
+        it."""
         now = time_of(event)
         passage = self.passages[topic]
         passage.latest, passage.alike, passage.advanced = now, 1, True
@@ -237,7 +237,7 @@ class Timing:
 
 
 SIMULATED = "clock"
-"""The topic of rosgraph_msgs/Clock, without its slash."""
+"""The topic of rosgraph_msgs/Clock, without its leading slash."""
 
 
 class By(StrEnum):
@@ -247,7 +247,7 @@ class By(StrEnum):
 
 
 class Clock:
-    """Gives events the time of another clock. Those before its first reading wait for it."""
+    """Gives events the time of another clock. Events before its first reading wait for it."""
 
     def __init__(self, by: By) -> None:
         self._by = by
@@ -271,11 +271,11 @@ class Clock:
         self._waiting.clear()
 
     def passed(self, event: Event) -> Event | None:
-        """Time has passed by the recording's clock, which says nothing of this one."""
+        """Time has passed by the recording's clock, which does not determine this one."""
         return None if self._now is None else {**event, "time": self._now}
 
     def finish(self) -> str:
-        """Why the run is no evidence: the clock was never read, or stood still."""
+        """Why the run is no evidence: the clock was never read, or did not advance."""
         if self._by is By.SIM and self._now is not None and not self._moved:
             return f"/clock stood still, by which the plan goes (`time: {self._by}`)"
         what = "no message of /clock came" if self._by is By.SIM else "no message had a `header.stamp`"
@@ -291,4 +291,4 @@ class Clock:
             read = seconds(at(event, way))
         except MappingError:
             return None
-        return None if self._by is By.STAMP and not read else read  # ROS leaves 0 where nobody has set it
+        return None if self._by is By.STAMP and not read else read  # ROS leaves 0 if nothing has set it

@@ -1,7 +1,7 @@
 """Answers and the inputs that they answered, in a batch of events: those that certainly held are only counted.
 
 An answer waits for the messages with its key, or (by latency) for those of its time. If all of these are in one batch,
-arrays say which they are. `pairing` judges the others, and gets of what was counted what it may still need.
+they are found with arrays. `pairing` judges the others, and receives the counted messages that it may still need.
 """
 
 from __future__ import annotations
@@ -28,33 +28,32 @@ _NEVER = sys.maxsize
 
 @dataclass(slots=True)
 class _Input:
-    """The messages of one input: by latency, first those of earlier batches that may still be asked for."""
+    """The messages of one input: by latency, first those of earlier batches that may still be needed."""
 
     before: Sequence[Said]
     rows: Ints
-    """-1: of an earlier batch."""
+    """The rows in the batch; -1: of an earlier batch."""
     ids: Ints
-    """Equal numbers, equal keys; by latency the times, in nanoseconds."""
+    """The same number for the same key; by latency the times, in nanoseconds."""
     codes: Ints
     seconds: Floats
     used: Ints
-    """The row at which the first answer is held against each."""
+    """For each message, the row at which the first answer is paired with it."""
     said: dict[int, Said] = field(default_factory=dict)
 
 
 @dataclass(slots=True)
 class _Asked:
-    """A clause's answers on one topic, of which it is certain that they held, or that this depends on what they
-    answered."""
+    """A clause's answers on one topic that certainly held, or whose verdict certainly depends on what they answered."""
 
     watched: Watched
     rows: Ints
     held: Flags
     met: Flags
     ends: Ints
-    """The row at which all inputs of each are known; by latency the time, in nanoseconds."""
+    """For each answer, the row at which all its inputs are known; by latency the time, in nanoseconds."""
     ranges: dict[str, tuple[Ints, Ints]]
-    """Of each input, the first and the last message that each answer may have answered."""
+    """For each input, the first and the last message that each answer may have answered."""
 
     def take(self, some: Flags) -> None:
         self.rows, self.ends = self.rows[some], self.ends[some]
@@ -63,7 +62,7 @@ class _Asked:
 
 
 class Paired:
-    """The answers to one monitor in one batch. `wrong`: the rows that the engine has to judge; these get more."""
+    """The answers to one monitor in one batch. `wrong`: the rows that the engine has to judge; more are added."""
 
     def __init__(self, watch: Watch, pairing: Pairing, batch: Batch, wrong: Flags) -> None:
         self._watch, self._pairing, self._batch, self._wrong = watch, pairing, batch, wrong
@@ -74,11 +73,11 @@ class Paired:
         self._times = _nanoseconds(batch) if self._by == "latency" and not batch.backwards else NONE
         self._numbers: dict[object, int] = {}
         self._groups: dict[tuple[str, object], tuple[Ints, Ints]] = {}
-        """Rows and ids of messages that have keys."""
+        """The rows and ids of messages that have keys."""
         self._inputs: dict[str, _Input] = {}
         self._asked: list[_Asked] = []
         self._odd = np.zeros(0, np.bool_)
-        """The ids of messages that the engine has to judge."""
+        """For each id, whether the engine has to judge the messages with it."""
         if self._possible():
             self._find()
         else:
@@ -128,7 +127,7 @@ class Paired:
         return UNREADABLE if value is None or column is None else column.code_of(value)
 
     def _ids(self, topic: str, path: tuple[str | int, ...], owner: object, count: int) -> Ints:
-        """By what a topic's messages are paired; by order, after so many that came before."""
+        """The ids by which a topic's messages are paired; by order, after `count` earlier messages."""
         rows = self._topics[topic]
         if self._by == "latency":
             return self._times[rows]
@@ -175,7 +174,7 @@ class Paired:
         self._asked.append(asked)
 
     def _match(self, one: _Input, ids: Ints) -> tuple[Ints, Ints]:
-        """The first and the last message of an input that answers may have answered; -1: none is known."""
+        """For each answer, the first and the last message of an input that it may have answered; -1: none is known."""
         if self._by == "latency":
             start = ids - self._latency - self._jitter
             return (
@@ -187,8 +186,8 @@ class Paired:
         return places[ids], places[ids]
 
     def _judged(self, asked: _Asked) -> Flags:
-        """Which answers hold whatever they answered, or only if they answered some of it; those that wait so long that
-        messages are forgotten are not among them."""
+        """Which answers hold whatever they answered, or only for some of it; without those that wait so long that
+        messages are forgotten."""
         counts = {name: last - first + 1 for name, (first, last) in asked.ranges.items()}
         cases = np.ones(len(asked.rows), np.int64)
         for count in counts.values():
@@ -208,7 +207,7 @@ class Paired:
                 count = counts[name][some]
                 picks[name] = self._inputs[name].codes[first[some] + left % count]
                 left //= count
-                certain[some] &= picks[name] >= 0  # also those that only assumptions speak of
+                certain[some] &= picks[name] >= 0  # including those that only assumptions speak of
             holds, met, fails = self._watch.holds(asked.watched, asked.rows[some], picks)
             asked.held[some] &= holds
             asked.met[some] &= met
@@ -219,7 +218,7 @@ class Paired:
         return certain
 
     def close(self) -> bool:
-        """Whatever has the key of a message that the engine judges is judged by it too. Whether that was news."""
+        """Mark all messages that share a key with one that the engine judges. Returns whether any was added."""
         before = np.count_nonzero(self._wrong)
         for rows, ids in self._groups.values():
             self._odd[ids[self._wrong[rows]]] = True
@@ -228,7 +227,7 @@ class Paired:
         return bool(np.count_nonzero(self._wrong) > before)
 
     def settle(self) -> None:
-        """No more rows are judged by the engine."""
+        """No more rows are added to those that the engine judges."""
         for asked in self._asked:
             asked.take(~self._wrong[asked.rows])
             for name, (first, _) in asked.ranges.items():
@@ -237,7 +236,7 @@ class Paired:
     # -- what is counted -----------------------------------------------------------------------------------------------
 
     def due(self, start: int) -> int:
-        """The row from `start` at which an answer that waits for the time to pass is judged."""
+        """The row, from `start` on, at which an answer that waits for time to pass is judged."""
         if self._by != "latency" or not self._pairing.waiting or not len(self._times):
             return _NEVER
         passed = next(iter(self._pairing.waiting.values())).time + self._pairing.jitter
@@ -246,7 +245,7 @@ class Paired:
         return int(self._listened[place]) if place < len(self._listened) else _NEVER
 
     def note(self, start: int, end: int) -> None:
-        """Some rows are only counted."""
+        """Count the rows from `start` to `end` without judging them."""
         for name, one in self._inputs.items():
             self._hear(name, one, start, end)
         for asked in self._asked:
@@ -254,7 +253,7 @@ class Paired:
             if low < high:
                 self._count(asked, low, high)
         if self._by != "latency":
-            self._watch.monitor.settle(0, [])  # those that waited for too many others
+            self._watch.monitor.settle(0, [])  # those that waited while too many others came
         elif (place := int(np.searchsorted(self._listened, end))) and len(self._times):
             now = self._times[self._listened[place - 1]]
             for asked in self._asked:
@@ -308,7 +307,7 @@ class Paired:
 
 
 def _nanoseconds(batch: Batch) -> Ints:
-    """Times in nanoseconds; none if one of them is not a whole number of these."""
+    """Times in nanoseconds; none if one of them is not an integer number of nanoseconds."""
     if batch.nanoseconds is not None:
         return batch.nanoseconds
     found = [divmod(ticks_at({"time": raw}), _NANO) for raw in batch.raws]

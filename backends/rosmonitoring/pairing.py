@@ -1,11 +1,11 @@
-"""Which input did this answer answer? Order of arrival is not order of cause: each topic has its own connection.
+"""Pairs each answer with its inputs. Order of arrival is not causal order: each topic has its own connection.
 
-By `arrival`, an answer is held against the values that came before it: for traces that one process wrote in order. By
-`key` or `stamp`, against those of the message that bears the same key. By `latency`, each input may have had any value
-that was current from `latency + jitter` before the answer to `jitter` after it, independently: what holds for all
-combinations holds, what is broken for all is broken, and anything else is undecided. By `call`, against the request of
-the same call; by `order`, the k-th against the k-th, where there are as many of both. Independence takes in more
-combinations than there were, so that both verdicts are right as long as the two bounds are.
+By `arrival`, an answer is compared with the values that came before it: for traces that one process wrote in order. By
+`key` or `stamp`, with those of the message that has the same key. By `latency`, each input may have had any value that
+was current from `latency + jitter` before the answer to `jitter` after it, independently: what holds for all
+combinations holds, what is broken for all is broken, and anything else is undecided. By `call`, with the request of the
+same call; by `order`, the k-th with the k-th, if there are as many of both. Independence includes more combinations
+than occurred, so that both verdicts are right as long as the two bounds are.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ class Answers:
 
 
 Ticks = int | Fraction
-"""A time in units of 10^-20 seconds (`TICKS`), exact: a whole number wherever a trace says it in decimals."""
+"""A time in units of 10^-20 seconds (`TICKS`), exact: an integer if the trace writes it in decimals."""
 
 
 def ticks(seconds: Fraction) -> Ticks:
@@ -54,7 +54,7 @@ def ticks(seconds: Fraction) -> Ticks:
 
 
 def ticks_at(event: Mapping[str, Any]) -> Ticks:
-    """As `ticks` of an event's time, and faster for plain digits."""
+    """The `ticks` of an event's time; faster for plain digits."""
     try:
         whole, _, rest = event["time"].partition(b".")
         return int(whole + rest) * _SCALES[len(rest)]
@@ -73,32 +73,32 @@ class Asked:
     event: Mapping[str, Any]
     index: int
     known: Mapping[str, Value]
-    """What its verdict depends on, but for the inputs."""
+    """The values that its verdict depends on, except the inputs."""
     inputs: tuple[str, ...]
     time: Ticks
     seconds: float
-    """The same, in binary."""
+    """The same, as a float."""
     key: object
     heard: Heard
     """The messages that make the answer."""
     places: tuple[int, ...]
     """Their places in the trace."""
     since: dict[str, float] = field(default_factory=dict)
-    """When the oldest message came that each input's value may be of."""
+    """For each input, when the oldest message came that its value may be from."""
     messages: dict[str, tuple[int, ...]] = field(default_factory=dict)
-    """The places in the trace of the messages that each input's value may be of."""
+    """For each input, the places in the trace of the messages that its value may be from."""
     needless: frozenset[str] = frozenset()
-    """The inputs of which only assumptions speak: there is a verdict also where they have said nothing yet, or what
-    cannot be read."""
+    """The inputs that only assumptions speak of: there is a verdict even if they have no message yet, or an unreadable
+    one."""
     unsaid: set[str] = field(default_factory=set)
-    """Those of them that may have said nothing yet."""
+    """Those of them that may have no message yet."""
     number: int = 0
-    """Among all that were asked."""
+    """Its number among all that were asked."""
 
 
 @dataclass(slots=True, eq=False)
 class Said:
-    """One message of an input. `value` None: it could not be read; an event: it was not read yet."""
+    """One message of an input. `value` None: it could not be read; an event: it has not been read yet."""
 
     time: Ticks
     seconds: float
@@ -106,7 +106,7 @@ class Said:
     value: Value | Mapping[str, Any] | None
     place: int
     used: bool = False
-    """An answer was held against it, as the only one of its key."""
+    """An answer was paired with it, as the only one of its key."""
 
 
 Choices = list[list[Said]] | str
@@ -115,12 +115,12 @@ Choices = list[list[Said]] | str
 
 @dataclass(slots=True)
 class _Seen:
-    """The latest messages of one input, in the order of their coming (by latency: of time), and by their keys."""
+    """The latest messages of one input, in the order of arrival (by latency: of time), and by their keys."""
 
     messages: deque[Said] = field(default_factory=deque)
     by_key: dict[object, list[Said]] = field(default_factory=dict)
     count: int = 0
-    """Of all, also of those that are no longer kept."""
+    """The number of all messages, including those that are no longer kept."""
 
     def keep(self, said: Said) -> None:
         self.messages.append(said)
@@ -135,7 +135,7 @@ class _Seen:
 
 @dataclass(slots=True)
 class _Count:
-    """The answers of one clause: how many, when the last of them came, and the inputs that any was held against."""
+    """The answers of one clause: their number, when the last of them came, and the inputs that any was paired with."""
 
     count: int = 0
     time: Ticks = 0
@@ -149,33 +149,33 @@ class Pairing:
     answers: Answers
     seen: dict[str, _Seen] = field(default_factory=dict)
     waiting: dict[int, Asked] = field(default_factory=dict)
-    """By their numbers."""
+    """The answers by their numbers."""
     asked: int = 0
-    """How many answers have been asked about."""
+    """The number of answers that were asked."""
     counts: dict[int, _Count] = field(default_factory=dict)
-    """By the clause."""
+    """The counts by the id of the watched clause."""
     answered: OrderedDict[int, Mapping[str, tuple[int, ...]]] = field(default_factory=OrderedDict)
-    """The place of an answer's message → those of the messages that it was held against."""
+    """The place of an answer's message → the places of the messages that it was paired with."""
     readers: Mapping[str, Reader] = field(default_factory=dict, repr=False)
-    """What reads the variables of which events are kept."""
+    """For each variable whose events are kept, its reader."""
     settled: Ticks | None = None
     """By latency: no input of this time or an earlier one may come any more."""
     late: str = ""
-    """Why it is no evidence: one came."""
+    """Why the run is no evidence: an input came too late."""
     lost: bool = False
-    """By order: a message was lost, as its topic's numbers say."""
+    """By order: a message was lost, according to its topic's numbers."""
     latency: Ticks = field(init=False)
     jitter: Ticks = field(init=False)
     _awaited: dict[object, list[Asked]] = field(default_factory=dict)
-    """The answers that wait for a key."""
+    """The answers that wait for each key."""
     _touched: list[object] = field(default_factory=list)
-    """The keys of what came since answers were last judged."""
+    """The keys of the messages that came since answers were last judged."""
 
     def __post_init__(self) -> None:
         self.latency, self.jitter = ticks(self.answers.latency), ticks(self.answers.jitter)
 
     def passed_over(self, name: str, count: int) -> _Seen:
-        """So many messages of an input came that no answer can be held against any more."""
+        """`count` messages of an input came that no answer can be paired with any more."""
         known = self.seen.get(name)
         if known is None:
             known = self.seen[name] = _Seen()
@@ -185,7 +185,7 @@ class Pairing:
     def saw(
         self, name: str, time: Ticks, seconds: float, key: object, value: Value | Mapping[str, Any] | None, place: int
     ) -> Said:
-        """A message of an input, which stands at a place of the trace."""
+        """A message of an input, at a place of the trace."""
         known = self.passed_over(name, 1)
         if self.answers.by != "latency":
             said = Said(time, seconds, known.count if self.answers.by == "order" else key, value, place)
@@ -204,7 +204,7 @@ class Pairing:
             insort(messages, said, key=_time)
         else:
             messages.append(said)
-        # what is older than any window that is still open, but for the last of it, can no longer be asked for
+        # messages older than every open window, except the last of them, are no longer needed
         first = next(iter(self.waiting.values()), messages[-1]).time
         since = first - self.latency - 2 * self.jitter
         while len(messages) > 1 and messages[1].time <= since:
@@ -212,12 +212,12 @@ class Pairing:
         return said
 
     def _differ(self, name: str, one: Said, other: Said) -> bool:
-        """Whether two messages have other values (one that cannot be read: any)."""
+        """Whether two messages have different values (an unreadable one always differs)."""
         values = self.value_of(name, one), self.value_of(name, other)
         return None in values or values[0] != values[1]
 
     def count(self, watched: Watched, time: Ticks, several: int = 1) -> _Count:
-        """Answers have come, which need not wait: they count among the others all the same."""
+        """Answers have come that need not wait: they are counted with the others."""
         found = self.counts.get(id(watched))
         if found is None:
             found = self.counts[id(watched)] = _Count()
@@ -229,7 +229,7 @@ class Pairing:
         """An answer has come."""
         counted = self.count(asked.watched, asked.time)
         counted.inputs = asked.inputs
-        if self.answers.by == "order" and asked.key is None:  # of one whose parts came apart, it says which it is
+        if self.answers.by == "order" and asked.key is None:  # an answer whose parts came apart has its own number
             asked.key = counted.count
         self.asked += 1
         asked.number = self.asked
@@ -242,8 +242,8 @@ class Pairing:
         return any(asked.index <= event for asked in self.waiting.values())
 
     def uneven(self) -> str:
-        """Why the answers need not be paired rightly; empty where they are. By order, what came after the last answer
-        need not have been answered yet."""
+        """Why the answers may be paired wrongly; empty if they are not. By order, inputs after the last answer may have
+        no answer yet."""
         if self.late:
             return self.late
         for counted in self.counts.values() if self.answers.by == "order" else ():
@@ -258,7 +258,7 @@ class Pairing:
         return ""
 
     def ready(self, now: Ticks | None) -> Iterator[tuple[Asked, Choices]]:
-        """The answers whose inputs are known by a time (None: the run is over), each with the messages of each input
+        """The answers whose inputs are known at a time (None: the run is over), each with the messages of each input
         that it may have answered, or why there are none."""
         latency = self.answers.by == "latency"
         for asked in self._whole(now):
@@ -280,13 +280,13 @@ class Pairing:
             yield asked, found
 
     def answer(self, place: int, messages: Mapping[str, tuple[int, ...]]) -> None:
-        """An answer's message was held against these messages of inputs."""
+        """An answer's message was paired with these messages of inputs."""
         self.answered[place] = {**self.answered.get(place, {}), **messages}
         if len(self.answered) > KEYS_KEPT:
             self.answered.popitem(last=False)
 
     def _whole(self, now: Ticks | None) -> Iterator[Asked]:
-        """The answers of which nothing more is awaited, in the order in which they came."""
+        """The answers that await nothing more, in the order in which they came."""
         waiting, touched = self.waiting, {*self._touched}
         self._touched.clear()
         if now is None:
@@ -298,7 +298,7 @@ class Pairing:
         return iter(sorted({asked.number: asked for asked in (*late, *whole)}.values(), key=_number))
 
     def _known(self, asked: Asked) -> bool:
-        """Whether all that an answer is held against has come."""
+        """Whether all messages that an answer is paired with have come."""
         inputs = () if asked.key is None else asked.inputs
         return all(name in self.seen and asked.key in self.seen[name].by_key for name in inputs)
 
@@ -366,14 +366,14 @@ class Pairing:
 
     @staticmethod
     def key(event: Mapping[str, Any], path: FieldPath) -> object:
-        """By what a message is paired; None of one that does not say it."""
+        """The key by which a message is paired; None if it has none."""
         if not path:
             return None
         try:
             raw: Any = event
             for step in path if path[0] not in ENVELOPE else ():
                 raw = raw[step]
-        except (KeyError, IndexError, TypeError):  # it may lie elsewhere
+        except (KeyError, IndexError, TypeError):  # it may be elsewhere
             raw = event
         try:
             raw = at(event, path) if raw is event else raw
@@ -393,7 +393,7 @@ def _stamp(raw: Mapping[str, Any]) -> int | Fraction:
 
 
 def backwards(now: Fraction, latest: Fraction | None, number: int) -> str:
-    """By arrival, the order of the events is that of cause: what times that run backwards say otherwise."""
+    """By arrival, the order of the events is taken as causal order: the contradiction, if times run backwards."""
     if latest is None or now >= latest:
         return ""
     return (
@@ -408,7 +408,7 @@ _time, _number = attrgetter("time"), attrgetter("number")
 
 
 def time_of(event: Mapping[str, Any]) -> Fraction:
-    """An event's time in seconds; 0 where it says none (which a recorded one always does)."""
+    """An event's time in seconds; 0 if it has none (a recorded one always has)."""
     try:
         found = exact(event.get("time"))
     except NotANumber:

@@ -34,7 +34,7 @@ def reader(rule: Fields | Choice) -> Reader:
 
 
 def at(event: Event, path: FieldPath) -> Any:
-    """The part of an event's message that a path leads to. Raises MappingError."""
+    """The part of an event's message at a path. Raises MappingError."""
     return _within(message_of(event, str(path[0])) if path else event, path)
 
 
@@ -64,7 +64,7 @@ _MISSING = object()
 
 
 def _converters(rule: Fields, sorts: tuple[s.Sort, ...]) -> tuple[Convert, ...]:
-    """How what each of the rule's paths leads to becomes a value."""
+    """For each of the rule's paths, the conversion of its content to a value."""
     found: list[Convert] = []
     for place, sort in enumerate(sorts):
         wire = rule.wire(place)
@@ -83,13 +83,13 @@ def _scalar(rule: Fields, sort: s.Sort) -> Reader:
         return _with_default(rule, lambda message, old: tuple([read(at(message, p)) for p, read in pairs]))
     path, read = rule.paths[0], made[0]
     if len(path) == 1 and isinstance(path[0], str) and path[0] not in ENVELOPE:
-        name = path[0]  # the most frequent reader of all
+        name = path[0]  # by far the most frequent reader
         return _with_default(rule, lambda message, old: read(message[name] if name in message else at(message, path)))
     return _with_default(rule, lambda message, old: read(at(message, path)))
 
 
 def _with_default(rule: Fields, read: Reader) -> Reader:
-    """Where there is no reading, the value that the plan gives."""
+    """A reader that returns the plan's value if there is no reading."""
     elsewhere = rule.elsewhere
     if elsewhere is None:
         return read
@@ -122,7 +122,7 @@ def _function(rule: Fields, sort: s.FunctionSort) -> Reader:
 
 
 def _points(rule: Fields, sorts: tuple[s.Sort, ...]) -> Callable[[Event], list[tuple[Value, ...]]]:
-    """The tuples that a message brings; a tuple with no reading among its parts is not brought."""
+    """The tuples that a message brings, without those that have no reading among their parts."""
     each, pairs = rule.each, tuple(zip(rule.paths, _converters(rule, sorts), strict=True))
 
     def one(message: Event, part: Callable[[Any, FieldPath], Any]) -> tuple[Value, ...] | None:
@@ -192,7 +192,7 @@ def from_text(cell: str, sort: s.Sort, held: Wire | None = None) -> Value:
 
 
 class Undecided(Exception):  # noqa: N818 - it is what was found wrong
-    """Several ways, or none; the text says which, `hint` what the plan may write."""
+    """Several ways to read a variable, or none; the text says which, `hint` what the plan may write."""
 
     def __init__(self, message: str, hint: str | None = None) -> None:
         super().__init__(message)
@@ -200,7 +200,7 @@ class Undecided(Exception):  # noqa: N818 - it is what was found wrong
 
 
 def decide(sort: Sort, message: Message, known: Definitions, values: Mapping[str, str]) -> tuple[FieldPath, ...]:
-    """The fields of the message that a variable of the sort means. Raises Undecided."""
+    """The fields of the message that a variable of the sort is read from. Raises Undecided."""
     missing = known.missing(message)
     if missing:
         raise Undecided(f"nothing defines {', '.join(missing)}, of which {message.name} is made", SOURCES)
@@ -230,8 +230,8 @@ def _hint(
     known: Definitions,
     values: Mapping[str, str],
 ) -> str | None:
-    """What the plan may write of arrays, whose items no variable means by itself, and of numbers that may be elements
-    of an enumeration; None where there is nothing of the kind."""
+    """A proposal for the plan: for arrays, whose items no variable is read from by default, and for numbers that may be
+    elements of an enumeration; None if there are neither."""
     if len(wanted) != 1:
         return None
     sort = wanted[0]
@@ -254,7 +254,7 @@ SOURCES = "name its file under `messages:`, or the distribution: `ros: {distro: 
 
 
 def suits(sort: Sort, wire: Wire, holder: Message, known: Definitions, values: Mapping[str, str]) -> bool:
-    """`fits`, and a number stands for an element only where something says for which."""
+    """Whether it `fits`, and, if numbers denote elements, each element has a known number."""
     if not fits(sort, wire, known):
         return False
     if isinstance(sort, EnumSort) and isinstance(wire, Scalar) and wire.name in INTEGERS:
@@ -263,8 +263,8 @@ def suits(sort: Sort, wire: Wire, holder: Message, known: Definitions, values: M
 
 
 def words(sort: EnumSort, wire: Scalar, holder: Message, values: Mapping[str, str]) -> dict[str, str]:
-    """What a message's words or numbers mean: by the plan's `values` (which may name constants of the definition), else
-    by the definition's constants whose names are the elements', in capitals or not."""
+    """The meaning of a message's words or numbers: by the plan's `values` (which may name constants of the definition),
+    otherwise by the definition's constants whose names are the elements', ignoring case."""
     constants = {name: text for name, kind, text in holder.constants if kind == wire.name}
     if values:
         return {constants.get(key, key): meant for key, meant in values.items()}
@@ -275,7 +275,7 @@ def words(sort: EnumSort, wire: Scalar, holder: Message, values: Mapping[str, st
 
 
 def _places(message: Message, known: Definitions) -> list[tuple[FieldPath, Wire, Message]]:
-    """What may be meant: the leaves, and each message within the message (for tuples), the message itself first."""
+    """The candidates: the leaves, and each message within the message (for tuples), the message itself first."""
     found: list[tuple[FieldPath, Wire, Message]] = [((), Nested(message.name), message)]
     seen: set[FieldPath] = set()
     for path, wire, holder in known.leaves(message):
@@ -289,7 +289,7 @@ def _places(message: Message, known: Definitions) -> list[tuple[FieldPath, Wire,
 
 
 def _ways(fitting: Sequence[Sequence[bool]], places: int) -> int:
-    """In how many ways the parts can be filled by places in their order: 0, 1, or 2 for several."""
+    """The number of ways to fill the parts by places in their order: 0, 1, or 2 for several."""
     counts = [1] + [0] * len(fitting)
     for at in range(places):
         for part in range(len(fitting), 0, -1):
@@ -299,7 +299,7 @@ def _ways(fitting: Sequence[Sequence[bool]], places: int) -> int:
 
 
 def _only(fitting: Sequence[Sequence[bool]]) -> list[int]:
-    """The one way: each part takes the first place after the last that fits."""
+    """The only way: each part takes the first place after the last that fits."""
     found: list[int] = []
     at = 0
     for row in fitting:

@@ -1,8 +1,8 @@
 """How messages become values: rules as data.
 
-A rule says from which topic and fields a contract variable gets its value, or that it gets it another way: from the
-scenario's tables, or from an output's value of the step before. `avow.backends.rosmonitoring.options` makes the rules
-from the plan; `reading` turns messages into values by them; `rml` turns them into RML patterns.
+A rule says from which topic and fields a contract variable gets its value, or its other source: the scenario's tables,
+or an output's value of the step before. `avow.backends.rosmonitoring.options` makes the rules from the plan; `reading`
+turns messages into values by them; `rml` turns them into RML patterns.
 """
 
 from __future__ import annotations
@@ -23,16 +23,16 @@ NOTHING_KNOWN = Definitions({})
 
 
 class Hold(StrEnum):
-    """What a relation holds of, after several messages."""
+    """The tuples that a relation holds of, after several messages."""
 
     LATEST = "latest"
     """The tuple (or tuples) of the latest message: a position."""
     SEEN = "seen"
-    """Every tuple that a message has brought so far: what has been inspected."""
+    """Every tuple that a message has brought so far: the places inspected."""
 
 
 class Take(StrEnum):
-    """What of an array's items is meant."""
+    """The value taken from an array's items."""
 
     MIN = "min"
     MAX = "max"
@@ -40,7 +40,7 @@ class Take(StrEnum):
 
 
 class Gap(StrEnum):
-    """Numbers that stand for *no reading*, where the plan says so."""
+    """Numbers that mean *no reading*, if the plan says so."""
 
     NAN = "nan"
     INF = "inf"
@@ -64,8 +64,8 @@ Argument = FieldPath | Lookup
 @dataclass(frozen=True, slots=True)
 class Fields:
     """Scalar, Collection and Function rules. For a function with a result, the last path is the result's, and
-    `elsewhere` its value where no message has said. `each` leads to a list of tuples in one message. `names` turns a
-    message's word or number into the contract's."""
+    `elsewhere` its value where no message has given one. `each` leads to a list of tuples in one message. `names` turns
+    a message's word or number into the contract's."""
 
     variable: Variable
     topic: str
@@ -74,19 +74,19 @@ class Fields:
     hold: Hold = Hold.LATEST
     each: FieldPath | None = None
     elsewhere: Value | None = None
-    """Of any other variable: its value where there is no reading."""
+    """For any other variable: its value if there is no reading."""
     initial: Value | None = None
     wires: tuple[Wire | None, ...] = ()
-    """What each path leads to; None where nothing defines the message: then its digits mean what they say."""
+    """The type of the field at each path; None if nothing defines the message: then its digits are taken literally."""
     known: Definitions = field(default=NOTHING_KNOWN, hash=False, repr=False)
-    """For messages within the message."""
+    """The definitions of messages within the message."""
     take: Take | None = None
     gaps: frozenset[Gap] = frozenset()
     kind: str = ""
-    """The topic's type, where it is said."""
+    """The topic's type, if it is known."""
 
     def wire(self, at: int) -> Wire | None:
-        """The type of what a path leads to."""
+        """The type of the field at a path."""
         return self.wires[at] if at < len(self.wires) else None
 
 
@@ -98,12 +98,12 @@ class Choice:
     topic: str
     tag: FieldPath
     arguments: Mapping[str, tuple[Argument, ...]] = field(hash=False)
-    """Constructor → where its arguments come from."""
+    """Constructor → the sources of its arguments."""
     names: Mapping[str, str] = field(default_factory=dict, hash=False)
     """The message's word → constructor."""
     initial: Value | None = None
     wires: Mapping[FieldPath, Wire] = field(default_factory=dict, hash=False)
-    """Of the fields whose types are known."""
+    """The types of fields, if they are known."""
     kind: str = ""
 
 
@@ -117,7 +117,7 @@ class Constant:
 
 @dataclass(frozen=True, slots=True)
 class Previous:
-    """The value that an output had before the step: while an event changes `source`, still the old one."""
+    """The value that an output had before the step: while an event changes `source`, it is still the old one."""
 
     variable: Variable
     source: str
@@ -129,12 +129,12 @@ Rule = Fields | Choice | Constant | Previous
 
 
 def of_latest(rule: Rule | None) -> bool:
-    """Whether a value is made of the latest message alone."""
+    """Whether a value is determined by the latest message alone."""
     return not isinstance(rule, Fields) or rule.hold is Hold.LATEST
 
 
 def heard_through(rule: Rule) -> str:
-    """The variable whose messages give a rule's value; empty for what the scenario gives."""
+    """The variable whose messages give a rule's value; empty for a value of the scenario."""
     match rule:
         case Previous(source=name):
             return name
@@ -145,7 +145,7 @@ def heard_through(rule: Rule) -> str:
 
 
 def otherwise(one: Rule, other: Rule) -> bool:
-    """Whether one rule reads other values from a topic's messages than another does, as far as rules show it."""
+    """Whether two rules read different values from a topic's messages, as far as the rules show it."""
     match one, other:
         case Fields() | Choice(), Fields() | Choice() if one.topic.lstrip("/") != other.topic.lstrip("/"):
             return True
@@ -158,7 +158,7 @@ def otherwise(one: Rule, other: Rule) -> bool:
             return (one.tag, one.arguments, one.names) != (other.tag, other.arguments, other.names)
         case Fields() | Choice(), Fields() | Choice():
             return True
-        case _:  # one of them is of no message
+        case _:  # one of them reads no message
             return False
 
 
@@ -171,8 +171,8 @@ def paths_of(rule: Fields | Choice) -> tuple[FieldPath, ...]:
 
 
 def told_only(rules: Mapping[str, Rule], mapped: Iterable[str]) -> Iterator[tuple[str, str]]:
-    """The outputs that the plan's mapping reads from nothing but fields which give inputs, with these inputs: what a
-    node is told is no answer of it."""
+    """The outputs that the plan's mapping reads only from fields that give inputs, with these inputs: a node's input is
+    no answer of it."""
     fields = {
         name: {(rule.topic.lstrip("/"), path) for path in paths_of(rule)}
         for name, rule in rules.items()

@@ -1,5 +1,5 @@
-"""What runs show: recorded ones are evidence. For other methods, runs that were made are judged, and the steps of a
-recording told."""
+"""The results of runs: recorded runs are evidence; for other methods, generated runs are judged, and the steps of a
+recording extracted."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ from .watched import Fault, Tally, Violation
 
 
 def discharge(job: Job, traces: Mapping[str, str], limits: Limits) -> Report:
-    """As `Backend.discharge`, by these recordings."""
+    """As `Backend.discharge`, with these recordings."""
     found, faults = setup(job.system, job.node, job.method.options)
     if faults:
         return Report.alike(job, Verdict.ERROR, told(job, faults), "avow monitor", __version__)
@@ -75,7 +75,7 @@ def discharge(job: Job, traces: Mapping[str, str], limits: Limits) -> Report:
 
 
 def _without_trace(job: Job, found: Setup, refused: dict[str, str], obligation: Obligation) -> Outcome:
-    """A monitor is no evidence before it has watched something."""
+    """The outcome without a trace: a monitor is no evidence before it has judged one."""
     spoken = _spoken(job, obligation)
     hidden = next((reason for name, reason in found.hidden.items() if name in spoken), None)
     if hidden is not None:
@@ -88,7 +88,7 @@ def _without_trace(job: Job, found: Setup, refused: dict[str, str], obligation: 
 
 
 def _with_upstream(job: Job, found: Setup) -> list[Monitor]:
-    """The node's own monitor, and those of the nodes from which its data comes: as far as they can be watched."""
+    """The node's own monitor, and those of the nodes from which its data comes, if they can be watched."""
     system, names = job.system, dataflow(job.system).upstream(job.node.name)
     monitors = [Monitor(found, None if job.node.name in names else [o.name for o in job.obligations])]
     for name in sorted(names - {job.node.name}):
@@ -101,7 +101,7 @@ def _with_upstream(job: Job, found: Setup) -> list[Monitor]:
 
 
 def _judge(job: Job, name: str, monitors: Sequence[Monitor], deadline: float) -> Run:
-    """What a trace shows of the first monitor's node."""
+    """Judge a trace for the first monitor's node."""
     monitor, whole = monitors[0], Session(job.system, tuple(monitors))
     run = Run(name, monitor)
     path = inside(job.root, name)
@@ -118,7 +118,7 @@ def _judge(job: Job, name: str, monitors: Sequence[Monitor], deadline: float) ->
                 run.unknown = f"{name}: time was up after {monitor.events} events"
                 break
     except Rejected as error:
-        # by the plan's name for it: where the folder lies on this machine is no part of what was found
+        # named as in the plan: the folder's location on this machine is no part of the result
         told = ((f"{name}, line {d.span.line}" if d.span else name, d.message) for d in error.diagnostics)
         run.trouble = "; ".join(f"{where}: {message.replace(str(path), name)}" for where, message in told)
     except OSError as error:
@@ -127,7 +127,7 @@ def _judge(job: Job, name: str, monitors: Sequence[Monitor], deadline: float) ->
 
 
 def _draw(job: Job, run: Run) -> None:
-    """Read once more what the picture of a run shows."""
+    """Read the trace once more, for the picture of a run."""
     monitor, path = run.monitor, inside(job.root, run.name)
     if monitor.events and path is not None and not run.trouble:
         run.heard = signals([monitor.setup], path, origin(job.system), monitor.events, run.marks, monitor.listens)
@@ -146,7 +146,7 @@ def _timelines(job: Job, found: Setup, runs: list[Run], obligation: Obligation) 
 
 
 def _excuse(job: Job, runs: list[Run]) -> str:
-    """The first assumption that was broken, by whom, and where that began."""
+    """The first assumption that was broken, by which node, and where that began."""
     wrong = (Fault.ASSUMPTION, Fault.PROVIDER)
     found = ((run.name, v) for run in runs for v in run.first.values() if v.fault in wrong)
     first = min(found, key=lambda one: (one[0], one[1].index), default=None)
@@ -171,8 +171,8 @@ ARRIVAL = Answers("arrival", "callbacks run one at a time, and what they publish
 
 
 def judge(job: Job) -> Callable[[Iterable[Mapping[str, Any]]], JudgedRun]:
-    """As `Backend.judge`. Which input an answer answered is by arrival, unless the options say otherwise; deadlines of
-    the wire (`fresh`, `rate`) are none of a run that was made. Raises Rejected."""
+    """As `Backend.judge`. Answers are paired with inputs by arrival, unless the options say otherwise; deadlines of the
+    wire (`fresh`, `rate`) do not apply to a generated run. Raises Rejected."""
     found = usable(job.system, job.node, job.method.options)
     used = replace(found, answers=found.answers or ARRIVAL, fresh={}, rates={}, shared={})
     names = [o.name for o in job.obligations]
@@ -191,8 +191,8 @@ def judge(job: Job) -> Callable[[Iterable[Mapping[str, Any]]], JudgedRun]:
 
 
 def steps(job: Job, traces: Iterable[str]) -> Iterator[tuple[Mapping[str, Value], ...]]:
-    """As `Backend.steps`. A step begins with an output that its answer has not had yet, or that inputs have changed
-    before."""
+    """As `Backend.steps`. A step begins with an output that its answer has not had yet, or with an output after the
+    inputs changed. Raises Rejected."""
     found = usable(job.system, job.node, job.method.options)
     for name in traces:
         path = inside(job.root, name)
@@ -219,7 +219,7 @@ def _steps(monitor: Monitor, events: Iterable[Recorded]) -> Iterator[Mapping[str
 
 
 def _breaks(found: Setup, violation: Violation) -> bool:
-    """Whether an event is none that the contract allows the node's surroundings."""
+    """Whether an event is one that the contract does not allow the node's environment."""
     inputs = {port.variable.qualified for port in found.node.inputs}
     return violation.fault in (Fault.ASSUMPTION, Fault.PROVIDER) or (
         violation.fault is Fault.MAPPING and violation.clause in inputs

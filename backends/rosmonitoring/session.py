@@ -34,10 +34,10 @@ if TYPE_CHECKING:
 
 
 RAW = "_mon"
-"""Behind the name of a topic that is filtered: what its node says."""
+"""The suffix of a filtered topic's name under which its node publishes."""
 
 WITHHELD = (Fault.GUARANTEE, Fault.EXCUSED, Fault.MAPPING)
-"""What keeps a message from being passed on; an assumption that is broken, or a silence, is not its fault."""
+"""The faults that keep a message from being passed on, not those of other causes (broken assumptions, silences)."""
 
 
 def raw(topic: str) -> str:
@@ -45,8 +45,8 @@ def raw(topic: str) -> str:
 
 
 def filtered(setups: Iterable[Setup]) -> frozenset[str]:
-    """The topics that are filtered. Raises Rejected where the plan names none, and where a guarantee of what is
-    filtered is not judged by a message of that topic alone, as it comes."""
+    """The topics that are filtered. Raises Rejected if the plan names none, or if a guarantee on a filtered topic is
+    not judged by a message of that topic alone, as it comes."""
     wrong: list[Diagnostic] = []
     found: set[str] = set()
     for one in setups:
@@ -72,8 +72,8 @@ def filtered(setups: Iterable[Setup]) -> frozenset[str]:
 
 
 def _report_withheld(monitors: Iterable[Monitor], counts: Mapping[str, int]) -> None:
-    """A record behind a filter holds what its node said, and what was passed on. Where that is less, the guarantees
-    were met by the filter, and it is no evidence of the node."""
+    """A record behind a filter holds what its node published, and what was passed on. If fewer messages were passed on,
+    the filter met the guarantees, and the record is no evidence about the node."""
     for monitor in monitors:
         for topic in sorted(monitor.setup.filtered):
             said, passed = counts.get(raw(topic), 0), counts.get(topic, 0)
@@ -93,11 +93,11 @@ class Session:
     unheard: dict[str, int] = field(default_factory=dict)
     """Topics of the trace that no monitor listens to, and their events."""
     withheld: dict[str, int] = field(default_factory=dict)
-    """Topics of which messages were not passed on, and how many."""
+    """Topics with messages that were not passed on, and their number."""
     behind_filters: dict[str, int] = field(init=False)
-    """The messages of topics that are filtered, as they are said and as they are passed on."""
+    """The number of messages of filtered topics, as published and as passed on."""
     asked: frozenset[str] = frozenset()
-    """The nodes that are to be monitored: those named, else those with such a method in the plan, else all."""
+    """The nodes to be monitored: those named, otherwise those with such a method in the plan, otherwise all."""
     _blame: Blame | None = None
 
     def __post_init__(self) -> None:
@@ -105,7 +105,7 @@ class Session:
         self.behind_filters = {name: 0 for topic in topics for name in (topic, raw(topic))}
 
     def prompt(self) -> None:
-        """Breaches are to be told when they are seen, also such as the end of the run may withdraw."""
+        """Report breaches when they are seen, even if the end of the run may withdraw them."""
         for monitor in self.monitors:
             monitor.prompt = True
 
@@ -118,13 +118,13 @@ class Session:
         yield from self.told([v for monitor in self.monitors for v in monitor.step(event)])
 
     def offer(self, event: Mapping[str, Any]) -> tuple[list[Violation], bool]:
-        """What is found in a message of a topic that is filtered, and whether it may be passed on. Others than its node
-        hear it only then."""
+        """The violations in a message of a filtered topic, and whether it may be passed on. Monitors of other nodes
+        receive it only then."""
         topic = str(event["topic"])
         self.heard(topic, 1)
         own = [m for m in self.monitors if same_topic(topic) in m.setup.filtered]
         found = [v for monitor in own for v in monitor.step(event)]
-        # what was said before may be told only now, and what is wrong now only later
+        # faults of earlier messages may be reported only now, and those of this one only later
         passed = not any(v.fault in WITHHELD and v.index == m.events for m in own for v in found)
         passed = passed and not any(m.doubts is not None and m.doubts.latest == m.events for m in own)
         if not passed:
@@ -138,7 +138,7 @@ class Session:
         yield from self.told([v for monitor in self.monitors for v in monitor.tick(event)])
 
     def heard(self, topic: str, count: int) -> None:
-        """So many events of a topic (without a name: of none) have come."""
+        """`count` events of a topic (without a name: of none) have come."""
         self.events += count
         if same_topic(topic) in self.behind_filters:
             self.behind_filters[same_topic(topic)] += count
@@ -146,11 +146,11 @@ class Session:
             self.unheard[topic] = self.unheard.get(topic, 0) + count
 
     def run(self, path: Path) -> Iterator[tuple[int, Violation]]:
-        """Judge a whole trace: what was found, each with the line (0 in a bag) of its event. Raises Rejected."""
+        """Judge a whole trace: the violations, each with the line (0 in a bag) of its event. Raises Rejected."""
         return ((line, violation) for line, found in self.judged(path) for violation in found)
 
     def judged(self, path: Path) -> Iterator[tuple[int, list[Violation]]]:
-        """As `run`: lines, and what was found there; often nothing, so that whoever waits can look at the clock."""
+        """As `run`: lines, and the violations there, often none, so that the caller can check the clock."""
         columns = Columns(self.monitors, self.told, self.heard)
         return self._whole(self._of_bag(path, columns) if is_bag(path) else columns.run(path))
 
@@ -160,25 +160,25 @@ class Session:
             yield from ((0, found) for _, found in columns.batches(batches))
 
     def arrays(self, topics: Mapping[str, Mapping[str, npt.NDArray[Any]]]) -> Iterator[tuple[int, Violation]]:
-        """As `run`, of arrays: topic → field (`time` in seconds, `data`, `pose.x`) → a number for each message. The
-        number of the event takes the line's place."""
+        """As `run`, for arrays: topic → field (`time` in seconds, `data`, `pose.x`) → a number for each message. The
+        number of the event replaces the line."""
         batches = Columns(self.monitors, self.told, self.heard).batches(of_arrays(topics))
         return ((line, violation) for line, found in self._whole(batches) for violation in found)
 
     def read(self, read: Callable[[int], bytes]) -> Iterator[tuple[int, Violation]]:
-        """As `run`, of lines of standard input as they come, as `Columns.lines`. Raises Rejected, OSError."""
+        """As `run`, for lines of standard input as they come, as `Columns.lines`. Raises Rejected, OSError."""
         lines = Columns(self.monitors, self.told, self.heard).lines(read, "<stdin>")
         return ((line, violation) for line, found in self._whole(lines) for violation in found)
 
     def _whole(self, judged: Iterable[tuple[int, list[Violation]]]) -> Iterator[tuple[int, list[Violation]]]:
-        """The same, and what is judged once the run is over."""
+        """The same, followed by the violations found at the end of the run."""
         line = 0
         for line, found in judged:
             yield line, found
         yield line, list(self.finish())
 
     def told(self, violations: list[Violation], *, over: bool = False) -> Iterator[Violation]:
-        """What was found at one event, with who is to blame."""
+        """The violations at one event, with their causes."""
         if not violations and not over:
             return
         if self._blame is None:
@@ -188,13 +188,13 @@ class Session:
             yield violation
 
     def finish(self) -> Iterator[Violation]:
-        """What is judged only once the run is over."""
+        """The violations that are found only at the end of the run."""
         yield from self.told([v for monitor in self.monitors for v in monitor.finish()], over=True)
         _report_withheld(self.monitors, self.behind_filters)
 
     def unmonitored(self) -> dict[str, str]:
-        """The clauses, of the nodes that are to be monitored, of whose publications too few were decided; what the plan
-        may say of each, or why that is so."""
+        """The clauses of monitored nodes for which too few publications were decided, each with a proposal for the
+        plan, or the reason."""
         return {
             f"{monitor.setup.node.name}.{name}": remedies(tally) or tally.reason
             for monitor, name, kind, tally in self.clauses()
@@ -205,7 +205,7 @@ class Session:
 
     @property
     def topics(self) -> tuple[str, ...]:
-        """What the monitors listen to."""
+        """The topics that the monitors listen to."""
         found: dict[str, str] = {}
         for monitor in self.monitors:
             for topic in monitor.setup.topics:
@@ -214,7 +214,7 @@ class Session:
 
     @property
     def kinds(self) -> dict[str, str]:
-        """The types of these topics (without their leading slash), as far as they are said."""
+        """The types of these topics (without their leading slash), as far as they are known."""
         return {topic: kind for monitor in self.monitors for topic, kind in monitor.setup.kinds.items()}
 
     @property
@@ -275,20 +275,20 @@ _COUNTED = {
     "undecided_order": "order", "before_first": "early", "unreadable": "unreadable", "incomplete": "partial",
     "nameless": "nameless", "by_initial_value": "supposed", "after_unseen": "forgotten", "open_at_end": "open",
 }  # fmt: skip
-"""What a summary calls a count, and what a tally does."""
+"""The name of a count in a summary, and in a tally."""
 
 
 def _asked(kind: ClauseKind, tally: Tally) -> int:
-    """An assumption is no evidence: before its first value it need not be decided."""
+    """The number of answers to be decided: for an assumption, without those before its first value."""
     return tally.asked - (tally.early if kind is ClauseKind.ASSUMPTION else 0)
 
 
 def session(
     system: System, nodes: Sequence[str] = (), trace: Path | None = None, make: Callable[[Setup], Monitor] = Monitor
 ) -> Session:
-    """Monitors for the named nodes, by default all, with the plan's mappings; where `trace` is a bag, also by what it
-    says of its messages. Raises Rejected."""
-    known = {node.name: node for node in system.contract.nodes if not node.relay}  # wiring says nothing itself
+    """Monitors for the named nodes, by default all, with the plan's mappings; if `trace` is a bag, also with its
+    definitions of its messages. Raises Rejected."""
+    known = {node.name: node for node in system.contract.nodes if not node.relay}  # wiring has no claims
     types, wrong = known_types(system, () if trace is None else (trace,))
     faults: list[Diagnostic] = list(wrong)
     monitors: list[Monitor] = []

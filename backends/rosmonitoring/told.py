@@ -1,5 +1,5 @@
-"""What is told of a monitor before it runs: which field each variable is read from, numbers that no message holds, and
-bags whose messages are other than they are taken for."""
+"""The notes on a monitor before it runs: the field that each variable is read from, numbers that no message can hold,
+and bags whose messages differ from the expected types."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from .wires import of_type
 
 
 def readable(setup: Setup, path: Path, where: Origin) -> tuple[Diagnostic, ...]:
-    """Why a bag's messages are not what the rules take them for. Raises Rejected for what is no bag."""
+    """Why a bag's messages are not what the rules expect. Raises Rejected if it is no bag."""
     if not is_bag(path):
         return ()
     found = carried(path, where)
@@ -55,8 +55,8 @@ def readable(setup: Setup, path: Path, where: Origin) -> tuple[Diagnostic, ...]:
 
 
 def _conflicts(path: Path, found: Carried, known: Definitions, types: Mapping[str, str]) -> Iterator[Diagnostic]:
-    """Where a bag's topics are other than they are taken for: of another type (`types`: topic → type), or of a type
-    that is made otherwise."""
+    """The topics of a bag that differ from expectation: by another type (`types`: topic → type), or by another
+    definition of the same type."""
     for topic, kind in types.items():
         there = found.types.get(topic)
         if there is None:
@@ -94,7 +94,7 @@ def _fields(message: Message) -> str:
 
 
 def readings(setup: Setup, span: Span | None) -> Iterator[Diagnostic]:
-    """One note that names for each variable of the node's clauses the fields that it is read from."""
+    """One note that gives, for each variable of the node's clauses, the fields that it is read from."""
     spoken = {v.qualified for clause in setup.node.clauses for v in free_variables(clause.formula)}
     texts = [reading(name, rule) for name, rule in setup.rules.items() if name in spoken]
     told = "; ".join(text for text in texts if text)
@@ -103,7 +103,7 @@ def readings(setup: Setup, span: Span | None) -> Iterator[Diagnostic]:
 
 
 def reading(name: str, rule: Rule) -> str:
-    """``in.range ← range : float32 (/scan)``; empty for what no message carries."""
+    """``in.range ← range : float32 (/scan)``; empty for a variable that no message carries."""
     match rule:
         case Fields():
             parts = []
@@ -115,14 +115,14 @@ def reading(name: str, rule: Rule) -> str:
             return f"{name} ← {taken}{', '.join(parts)}{each} ({rule.topic})"
         case Choice():
             return f"{name} ← {shown(rule.tag)} and its arguments ({rule.topic})"
-        case Constant() | Previous():  # the scenario, or the step before
+        case Constant() | Previous():  # from the scenario, or the step before
             return ""
         case _:
             assert_never(rule)
 
 
 def unholdable(setup: Setup, clause: Clause) -> Iterator[Diagnostic]:
-    """A warning for each number that a variable is asked to equal and that its field's type has no room for."""
+    """A warning for each number that a variable is compared with (==, !=) and that its type cannot represent."""
     for term in subterms(clause.formula):
         if not isinstance(term, Compare) or term.operator not in ("==", "!="):
             continue
@@ -152,7 +152,7 @@ def _unholdable(setup: Setup, clause: Clause, variable: Variable, number: Fracti
 
 
 def number_of(term: Term) -> Fraction | None:
-    """The value of a term without variables."""
+    """The value of a term without variables; None if it is not a number."""
     try:
         value = evaluate(term, {})
     except NotEvaluable:

@@ -30,7 +30,7 @@ _DECODER = json.JSONDecoder(parse_float=str.encode)
 
 
 def parse_event(text: str) -> Event:
-    """One JSON object. Raises ValueError saying what is wrong and, if it is the JSON, with the column."""
+    """One JSON object. Raises ValueError with the reason and, if the JSON is wrong, the column."""
     try:
         found = _DECODER.decode(text)
     except RecursionError:
@@ -41,8 +41,8 @@ def parse_event(text: str) -> Event:
 
 
 def _wrong_time(event: Event) -> str:
-    """What is wrong with the time of a recorded event, if anything is: ROSMonitoring writes one with every event, as
-    seconds, and a record without it was cut or put together by hand."""
+    """The error in the time of a recorded event; empty if it is right. ROSMonitoring writes a time with every event, in
+    seconds, and a record without it was cut or assembled by hand."""
     raw = event.get("time")
     if raw is None:
         return "the event has no `time`: seconds, as a number"
@@ -60,7 +60,7 @@ def _json(raw: object) -> str:
 
 
 def event_of(line: str, name: str, number: int) -> Event | None:
-    """The event of one line of a trace; None of a blank one. Raises Rejected."""
+    """The event of one line of a trace; None for a blank one. Raises Rejected."""
     if not line or line.isspace():
         return None
     if len(line) > EVENT_CHARACTERS:
@@ -79,15 +79,15 @@ def event_of(line: str, name: str, number: int) -> Event | None:
 
 
 def _not_text(name: str) -> Rejected:
-    """What is told of a file that is not UTF-8."""
+    """The error for a file that is not UTF-8."""
     return Rejected(_fault(name, 1, 1, "the file is not UTF-8 text"))
 
 
 def read_lines(
     lines: Iterable[str], name: str, chosen: Callable[[int], bool] = lambda index: True
 ) -> Iterator[Recorded]:
-    """Events from lines of text, those whose numbers are chosen; blank lines are skipped. Raises Rejected at the first
-    line that is no event."""
+    """The events of lines of text whose numbers are chosen; blank lines are skipped. Raises Rejected at the first line
+    that is no event."""
     index = 0
     for number, line in enumerate(lines, start=1):
         index += bool(line) and not line.isspace()
@@ -101,8 +101,8 @@ def read_trace(
     wanted: Callable[[str], bool] = lambda topic: True,
     chosen: Callable[[int], bool] = lambda index: True,
 ) -> Iterator[Recorded]:
-    """The events of a file (JSON lines, ROS 1 bag) or folder (ROS 2 bag), those whose numbers are chosen. `wanted`: the
-    topics whose messages of a bag are of interest, and are counted. Raises Rejected."""
+    """The events of a file (JSON lines, ROS 1 bag) or folder (ROS 2 bag) whose numbers are chosen. `wanted`: the topics
+    of a bag whose messages are read and counted. Raises Rejected."""
     if is_bag(path):
         with opened():
             for index, (channel, time, raw) in enumerate(bags.recorded(path, origin, wanted), start=1):
@@ -119,8 +119,8 @@ def read_trace(
 
 
 def parsed(chunk: bytes, name: str, before: int) -> tuple[list[Event], Sequence[int], int, Rejected | None]:
-    """The events of some whole lines, their lines, how many lines there are, and what is wrong at the line after these
-    events. `before`: the lines that came before."""
+    """The events of some whole lines, their line numbers, the number of lines, and the error at the line after these
+    events. `before`: the number of earlier lines."""
     try:
         lines = chunk.decode("utf-8" if before else "utf-8-sig").split("\n")[:-1]
     except UnicodeDecodeError:
@@ -131,7 +131,7 @@ def parsed(chunk: bytes, name: str, before: int) -> tuple[list[Event], Sequence[
         numbers = [k for k, line in enumerate(lines, start=before + 1) if line and not line.isspace()]
         written = [lines[number - before - 1] for number in numbers]
     collects = gc.isenabled()
-    gc.disable()  # thousands of new objects without a cycle: looking for one takes a third of the time
+    gc.disable()  # thousands of new objects without a cycle: searching for one takes a third of the time
     try:
         events: list[Event] = _DECODER.decode(f"[{','.join(written)}]")  # far faster than line by line
         if len(events) == len(written) and _plain(events):
@@ -155,7 +155,7 @@ def parsed(chunk: bytes, name: str, before: int) -> tuple[list[Event], Sequence[
 
 
 def _plain(events: Sequence[Event]) -> bool:
-    """Whether all surely have a topic and a time."""
+    """Whether all events certainly have a topic and a time."""
     try:
         topics, times = [event["topic"] for event in events], [event["time"] for event in events]
     except (TypeError, KeyError, IndexError):
@@ -166,7 +166,7 @@ def _plain(events: Sequence[Event]) -> bool:
 
 
 def chunks(more: Callable[[int], bytes], name: str) -> Iterator[bytes]:
-    """Whole lines, at most about a megabyte at a time, as they come; the last one ended."""
+    """Whole lines, at most about a megabyte at a time, as they come; the last one is ended. Raises Rejected."""
     rest: list[bytes] = []
     length = 0
     while True:
@@ -195,7 +195,7 @@ def carried(path: Path, origin: Origin = NOWHERE) -> Carried:
 
 @contextmanager
 def opened() -> Iterator[None]:
-    """Raises Rejected for what is no bag."""
+    """Raises Rejected if a file is no bag."""
     try:
         yield
     except bags.NoBag as wrong:

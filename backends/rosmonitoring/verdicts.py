@@ -1,4 +1,4 @@
-"""What recorded runs show of one guarantee: an ordered table of rules, of which the first that applies decides."""
+"""The verdict on a guarantee by recorded runs: an ordered table of rules, of which the first that applies decides."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ from .watched import Fault, Violation, coverage, old, remedies
 
 
 class Run:
-    """What one recording showed."""
+    """The result of one recording."""
 
     def __init__(self, name: str, monitor: Monitor) -> None:
         self.name = name
         self.monitor = monitor
         self.digest = ""
         self.missing = ""
-        """Which package reads it, where there is none."""
+        """The package that would read it, if that is not installed."""
         self.trouble = ""
         self.unknown = ""
         self.violations: list[Violation] = []
         self.first: dict[str, Violation] = {}
-        """The first of each fault and clause."""
+        """The first violation of each fault and clause."""
         self.marks = Marks()
         self.heard: Signals | None = None
 
@@ -89,7 +89,7 @@ class Shown:
 
     @property
     def bound(self) -> dict[str, object]:
-        """What the evidence is bounded by."""
+        """The bounds of the evidence."""
         found: dict[str, object] = {
             "events": self.events,
             "judged": self.judged,
@@ -121,7 +121,7 @@ def _broken(s: Shown) -> Answer | None:
     about = f"event {broken.index}{when} of {run.name}: {broken.explanation}"
     shown = Counterexample((*broken.bindings, *broken.values), about)
     summary = f"broken at event {broken.index} of {run.name}: {broken.explanation}"
-    if s.unpaired or s.backwards:  # nobody knows what the answer answered
+    if s.unpaired or s.backwards:  # it is unknown what the answer answered
         return Answer(Verdict.UNKNOWN, f"{s.backwards or UNPAIRED}: {summary}", shown)
     return Answer(Verdict.REFUTED, summary, shown)
 
@@ -217,7 +217,7 @@ RULES: tuple[Callable[[Shown], Answer | None], ...] = (
     _broken, _unread, _backwards, _unreadable, _undecided, _silent, _lost, _aged, _never, _unmonitored, _unpaired,
     _excused, _monitored,
 )  # fmt: skip
-"""A breach is one whatever else is wrong with the recordings."""
+"""A breach counts whatever else is wrong with the recordings."""
 
 
 def outcome(obligation: str, shown: Shown) -> Outcome:

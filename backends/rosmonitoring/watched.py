@@ -1,4 +1,4 @@
-"""A clause under watch, and what is told of an event that shows something wrong."""
+"""A clause under watch, and the violations that an event shows."""
 
 from __future__ import annotations
 
@@ -26,35 +26,35 @@ if TYPE_CHECKING:
 
 @dataclass(slots=True)
 class Tally:
-    """What became of one clause over a trace."""
+    """The results of one clause over a trace."""
 
     judged: int = 0
-    """Held, broken, or undecided since no calculation told."""
+    """Held, broken, or undecided since no calculation gave an answer."""
     broken: int = 0
     excused: int = 0
     undecided: int = 0
     order: int = 0
-    """Answers of which it is undecided what they answered."""
+    """Answers for which it is undecided what they answered."""
     early: int = 0
-    """Answers before everything that it speaks of had a value."""
+    """Answers before every variable of the clause had a value."""
     awaited: dict[str, None] = field(default_factory=dict)
-    """What had no value then."""
+    """The variables that had no value then."""
     unreadable: int = 0
     """Messages with one of its outputs that could not be read."""
     nameless: int = 0
-    """Messages of a topic that other nodes publish too, which do not say whose they are."""
+    """Messages of a topic that other nodes publish too, without a record of their publisher."""
     partial: int = 0
-    """Answers that were never whole, and that their parts alone do not decide."""
+    """Answers that were never complete, and whose parts alone do not decide them."""
     supposed: int = 0
     """Answers that held by an initial value of the plan, before any message: neither for nor against."""
     forgotten: int = 0
-    """Steps not decided, since steps before them went by unseen."""
+    """Steps not decided, since steps before them were not seen."""
     overdue: int = 0
-    """Steps at which what had missed its deadline before was still missing: no breaches of their own."""
+    """Steps at which a response that had missed its deadline was still missing: no further breaches."""
     open: int = 0
-    """Runs at whose end a response was still demanded, or may have been."""
+    """Runs at whose end a response was still required, or may have been."""
     published: int = 0
-    """Answers: publications of its outputs, those that make one answer counted once."""
+    """Answers: publications of its outputs, where those that make one answer count once."""
     triggered: bool = False
     """Its antecedent held at least once (or it has none)."""
 
@@ -62,9 +62,9 @@ class Tally:
     """The greatest age of each input when an answer came, in seconds."""
 
     hidden: bool = False
-    """It speaks of something that no message shows."""
+    """It speaks of a variable that no message shows."""
     unpaired: bool = False
-    """It speaks of inputs and outputs, and nobody has said which input an answer answered."""
+    """It speaks of inputs and outputs, and the plan does not say which input an answer answered."""
 
     @property
     def decided(self) -> int:
@@ -72,11 +72,11 @@ class Tally:
 
     @property
     def asked(self) -> int:
-        """Answers that were to be decided."""
+        """The number of answers that had to be decided."""
         return self.published - self.supposed - self.overdue
 
     def withdrawn(self, reason: str) -> None:
-        """What was judged so far is undecided after all; breaches were told."""
+        """All judgements so far are undecided after all, except breaches, which were reported."""
         self.undecided = self.judged - self.broken
         self.reason = self.reason or reason
 
@@ -86,28 +86,28 @@ class Tally:
         self.awaited.update(dict.fromkeys(awaited))
 
     def unsure(self, reason: str, several: int = 1) -> None:
-        """Of an answer, or of several, it is undecided what it answered."""
+        """It is undecided what one answer, or several, answered."""
         self.order += several
         self.reason = self.reason or reason
 
     def aged(self, now: float, heard: Mapping[str, float], names: Iterable[str]) -> None:
-        """An answer has come; `heard`: when its inputs had, those of these names among them."""
+        """An answer has come; `heard`: when its inputs had come, including those of these names."""
         for name in names:
             self.aging(name, now - heard[name])
 
     def aging(self, name: str, age: float) -> None:
-        """An input was so old when an answer came."""
+        """An input had this age, in seconds, when an answer came."""
         if age > self.ages.get(name, -1.0):
             self.ages[name] = max(age, 0.0)
 
     def unnamed(self, topic: str) -> None:
-        """A message of a topic that other nodes publish too has come, which does not say whose it is."""
+        """A message of a topic that other nodes publish too has come, without a record of its publisher."""
         self.published += 1
         self.nameless += 1
         self.reason = self.reason or f"several nodes publish {topic}, and a message does not say whose it is"
 
     reason: str = ""
-    """Why it is not judged at all, or the first reason why it was once undecided."""
+    """Why it is not judged at all, or the first reason why a judgement was undecided."""
 
 
 def coverage(tally: Tally) -> str:
@@ -133,7 +133,7 @@ def coverage(tally: Tally) -> str:
 
 
 def remedies(tally: Tally) -> str:
-    """What the plan may say so that a clause of which too little was decided is monitored."""
+    """Proposals for the plan, so that a clause of which too little was decided is monitored."""
     share = int(100 * tally.decided / tally.asked) / 100 if tally.asked else 0
     late = ", ".join(tally.awaited)
     first = (
@@ -154,7 +154,7 @@ def old(ages: Mapping[str, float]) -> str:
 
 
 class Fault(StrEnum):
-    """What an event showed to be wrong."""
+    """The kind of fault that an event showed."""
 
     GUARANTEE = "guarantee broken: this node"
     EXCUSED = "guarantee not met, with an assumption broken: not this node"
@@ -166,7 +166,7 @@ class Fault(StrEnum):
 
 
 Heard = Mapping[str, tuple[int, str]]
-"""Variable → the place in the trace of the latest message that carried it, and who published that, where it says so."""
+"""Variable → the place in the trace of the latest message that carried it, and its publisher, if recorded."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -174,7 +174,7 @@ class Part:
     """One output of an answer."""
 
     values: Mapping[str, Value] | None
-    """It, and what was known when it came but for the other outputs; None: it could not be read."""
+    """Its value and the values known when it came, except the other outputs; None: it could not be read."""
     heard: Heard
     time: Fraction
 
@@ -201,10 +201,10 @@ class Violation:
     bindings: tuple[tuple[str, str], ...]
     explanation: str
     heard: Heard = field(default_factory=dict, compare=False)
-    """Of a clause that was broken: which message each variable's value was of."""
+    """For a clause that was broken: the message that each variable's value is from."""
     cause: str = ""
-    """Of an assumption that was broken by what a node said: ``sensor.nonneg at event 7 caused guard.nonneg at event
-    8``, or why no first breach is known."""
+    """For an assumption that another node's message broke: ``sensor.nonneg at event 7 caused guard.nonneg at event 8``,
+    or why no first breach is known."""
 
     def text(self) -> str:
         about = ", ".join(f"{n} = {v}" for n, v in (*self.bindings, *self.values))
@@ -222,26 +222,26 @@ class Watched:
     witness: Callable[[Mapping[str, Value]], dict[str, Value] | None]
     tally: Tally
     outputs: frozenset[str] = frozenset()
-    """Those that must all be published anew before it is judged: they are the parts of one answer."""
+    """The outputs that must all be published again before it is judged: they are the parts of one answer."""
     fresh: dict[object, dict[str, Part]] = field(default_factory=dict)
-    """The parts of answers that are not whole yet, by what the parts of one answer have in common (`answers`)."""
+    """The parts of answers that are not complete yet, by the key that the parts of one answer share (`answers`)."""
     counted: dict[str, int] = field(default_factory=dict)
-    """By order: how many messages each output has had."""
+    """By order: the number of messages of each output."""
     scattered: bool = False
-    """A message of one of several outputs was lost: which parts are of one answer is not told any more."""
+    """A message of one of several outputs was lost: it is no longer known which parts are of one answer."""
     held: tuple[tuple[str, str], ...] = ()
-    """(previous value, its source): of one of several outputs, it is the value that the answer before had, whichever
-    of the outputs comes first in this one."""
+    """(previous value, its source): for one of several outputs, the value in the answer before, whichever of the
+    outputs comes first in this one."""
     memory: dict[str, Value] = field(default_factory=dict)
     """The held values."""
     key: tuple[int, ...] | None = None
     truth: bool | None = None
     inputs: tuple[str, ...] = ()
-    """The observed inputs that its answers are held against."""
+    """The observed inputs that its answers are compared with."""
     paired: tuple[str, ...] = ()
     """The observed inputs that an answer has to be paired with."""
     steps: Memory | None = None
-    """What it remembers, where it speaks of other steps."""
+    """Its memory, if it speaks of other steps."""
 
     @property
     def said(self) -> str:
@@ -249,7 +249,7 @@ class Watched:
         return self.clause.sentence or self.clause.text or show_term(self.clause.formula, "unicode")
 
     def truth_of(self, values: Mapping[str, Value], solver: bool) -> bool | None:
-        """Whether it holds of the values; None where neither evaluation nor, if it may be asked, Z3 can tell."""
+        """Whether it holds of the values; None if neither evaluation nor, if `solver`, Z3 can decide."""
         try:
             return bool(self.holds(values if self.steps is None else self.steps.at(values)))
         except NotEvaluable as error:
@@ -267,7 +267,7 @@ class Watched:
             return False
 
     def note_trigger(self, values: Mapping[str, Value]) -> None:
-        """Where nobody can tell, the antecedent counts as met."""
+        """If the antecedent cannot be evaluated, it counts as met."""
         if self.tally.triggered or self.trigger is None:
             return
         try:
@@ -276,7 +276,7 @@ class Watched:
             self.tally.triggered = True
 
     def only_supposed(self) -> None:
-        """Nothing was ever heard of what the step before is to have given: its initial value is no observation."""
+        """No message ever gave the value of the step before: its initial value is no observation."""
         tally = self.tally
         held = tally.decided - tally.broken
         tally.supposed += held
@@ -285,7 +285,7 @@ class Watched:
 
 
 def trigger_of(formula: Term) -> Term | None:
-    """What must hold somewhere for the formula to say anything: the antecedent, over all its variables."""
+    """The condition under which the formula is not vacuous: the antecedent, over all its variables, or None."""
     variables: list[Variable] = []
     while isinstance(formula, Quantified) and formula.quantifier is Quantifier.FORALL:
         variables.extend(formula.variables)
@@ -311,7 +311,7 @@ Shown = tuple[tuple[str, str], ...]
 
 
 def shown(watched: Watched, snapshot: Mapping[str, Value]) -> tuple[Shown, Shown]:
-    """What a broken clause speaks of, and the bindings of its quantifiers that break it."""
+    """The values of a broken clause's variables, and the bindings of its quantifiers that break it."""
     bindings: dict[str, Value] = {}
     try:
         if snapshot.keys() >= set(watched.names):
@@ -327,8 +327,8 @@ def shown(watched: Watched, snapshot: Mapping[str, Value]) -> tuple[Shown, Shown
 def open_verdict(
     watched: Watched, assumptions: Sequence[Watched], values: Mapping[str, Value], solver: bool
 ) -> bool | None:
-    """Whether a guarantee holds whatever is not known; None where that matters, or nobody can tell. Broken it is only
-    where all assumptions are known to hold."""
+    """Whether a guarantee holds for every value of the unknown variables; None if that depends on them, or cannot be
+    decided. It is broken only if all assumptions are known to hold."""
     truth = judge_open(watched.clause.formula, values, effort=JUDGE_EFFORT)
     if truth is False:
         for assumed in assumptions:

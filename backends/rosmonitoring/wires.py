@@ -1,7 +1,7 @@
-"""What a field holds, as a value: every number is the one that the message carries, in any transport.
+"""The content of a field as a value: every number is the one that the message carries, in any transport.
 
-A `float32` or `float64` means its exact binary number: digits of a JSON text are first rounded to the type, as they are
-in the node that reads the message. Where the type is not known, they mean what they say.
+A `float32` or `float64` means its exact binary number: digits of a JSON text are first rounded to the type, as in the
+node that reads the message. If the type is not known, the digits are taken literally.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from .tuning import NUMBER_LENGTH
 
 
 class Exact(Fraction):
-    """A fraction that computes its hash once: the same readings are looked up in tables again and again."""
+    """A fraction that computes its hash once: the same readings are looked up in tables repeatedly."""
 
     __slots__ = ("_kept",)
     _kept: int
@@ -38,11 +38,11 @@ class Exact(Fraction):
 
 
 class NotANumber(Exception):  # noqa: N818 - it names what was found
-    """NaN, an infinity, or a number too long to be meant."""
+    """NaN, an infinity, or a number too long to be intended."""
 
 
 def exact(raw: object) -> Fraction | int:
-    """The value of a number as it came from JSON or from a bag, or as it is. Raises NotANumber."""
+    """The value of a number from JSON or from a bag, or of an exact number. Raises NotANumber."""
     if isinstance(raw, bytes):
         return _fraction(raw.decode())
     if isinstance(raw, Fraction):
@@ -58,7 +58,7 @@ def exact(raw: object) -> Fraction | int:
 
 @functools.lru_cache(maxsize=4096)
 def whole(value: int) -> Fraction:
-    """A whole number as a real one."""
+    """An integer as a real number."""
     return Exact(value)
 
 
@@ -69,7 +69,7 @@ def _fraction(text: str) -> Fraction:
         if len(text) > NUMBER_LENGTH or abs(int(text.lower().partition("e")[2] or 0)) > NUMBER_LENGTH:
             raise NotANumber
         if point and text.isascii() and digits.isdecimal() and front.removeprefix("-").isdecimal():
-            return Exact(int(front + digits), 10 ** len(digits))  # as nearly all are
+            return Exact(int(front + digits), 10 ** len(digits))  # nearly all have this form
         return Exact(text)
     except (ValueError, ZeroDivisionError):
         raise NotANumber from None
@@ -80,15 +80,15 @@ T = TypeVar("T")
 
 
 class MappingError(Exception):
-    """A message that does not fit its rule; the text says how, for people."""
+    """A message that does not fit its rule; the text gives the reason, for people."""
 
 
 class NoReading(MappingError):  # noqa: N818 - it names what was found
-    """The field holds what the plan says is no reading."""
+    """The field holds a value that the plan declares as no reading."""
 
 
 def fits(sort: s.Sort, wire: Wire, known: Definitions) -> bool:
-    """Whether a field of the type may carry a value of the sort (an enumeration's words or numbers are asked apart)."""
+    """Whether a field of the type may carry a value of the sort (enumerations' words are checked separately)."""
     match sort, wire:
         case s.RealSort(), Scalar(name=name):
             return name in FLOATS or name in INTEGERS or name in ("time", "duration")
@@ -110,7 +110,7 @@ def fits(sort: s.Sort, wire: Wire, known: Definitions) -> bool:
             return len(parts) == len(items) and all(
                 part is not None and fits(item, part, known) for item, part in zip(items, parts, strict=True)
             )
-        case _:  # functions, algebraic types: the plan says how
+        case _:  # functions, algebraic types: the plan decides
             return False
 
 
@@ -124,8 +124,8 @@ def converter(
     sort: s.Sort, wire: Wire | None = None, names: Mapping[str, str] = MappingProxyType({}),
     known: Definitions = NOTHING_KNOWN, gaps: frozenset[Gap] = frozenset(),
 ) -> Convert:  # fmt: skip
-    """From what a field holds to a value of a sort; made once for each rule. Where its type is not known, or does not
-    fit, digits mean what they say."""
+    """A function from a field's content to a value of a sort; made once for each rule. If the field's type is not
+    known, or does not fit, digits are taken literally."""
     wire = None if wire is None or not fits(sort, wire, known) else wire
     match sort:
         case s.RealSort():
@@ -172,7 +172,7 @@ def _real(wire: Wire | None, gaps: frozenset[Gap]) -> Convert:
 def _tuple(
     sort: s.TupleSort, wire: Wire | None, names: Mapping[str, str], known: Definitions, gaps: frozenset[Gap]
 ) -> Convert:
-    """Of a message the fields, by name where the tuple has names, whatever else it holds; else the items."""
+    """For a message, its fields, by name if the tuple has names, whatever else it holds; otherwise the items."""
     if isinstance(wire, Nested):
         fields: dict[str, Wire | None] = dict(record(wire, known))
         labels = sort.labels or tuple(fields)
@@ -230,7 +230,7 @@ def _unreadable(why: str) -> Convert:
 
 
 def taken(take: Take, sort: s.Sort, wire: Array, known: Definitions, gaps: frozenset[Gap]) -> Convert:
-    """The least, the greatest, or the number of an array's items; items without a reading do not count."""
+    """The least or the greatest of an array's items, or their number; items without a reading do not count."""
     if take is Take.COUNT and not gaps:
         length = wire.length
         as_real = isinstance(sort, s.RealSort)
@@ -258,7 +258,7 @@ _REAL = s.RealSort()
 
 
 def of_type(value: Fraction, wire: Wire | None) -> Fraction:
-    """What a field of the type holds where `value` is written to it: the nearest number that there is."""
+    """The content of a field of the type after `value` is written to it: the nearest number of the type."""
     match wire:
         case Scalar(name="float64"):
             return _nearest(value, float(value), wide=True)
@@ -302,7 +302,7 @@ def _of_float(value: float, wide: bool) -> Fraction:
 
 
 LARGEST_SINGLE = (2 - 2.0**-23) * 2.0**127
-"""What a float32 holds at most."""
+"""The greatest float32."""
 
 
 def _single(value: float) -> float:
@@ -313,7 +313,7 @@ def _single(value: float) -> float:
 
 
 def _nearest(value: Fraction, near: float, *, wide: bool) -> Fraction:
-    """The number of the type that is nearest to a value; `near` is it, or (rounded twice) next to it."""
+    """The number of the type that is nearest to a value; `near` is that number or (rounded twice) next to it."""
     if wide:
         return _held(Fraction(near), wide=True)
     beside = (next_single(near, end) if near else near for end in (-math.inf, math.inf))
@@ -333,7 +333,7 @@ def _held(value: Fraction, *, wide: bool) -> Fraction:
 
 
 def seconds(raw: Any) -> Fraction:
-    """ROS 1 writes secs and nsecs, ROS 2 sec and nanosec."""
+    """A time in seconds: ROS 1 writes secs and nsecs, ROS 2 sec and nanosec. Raises MappingError."""
     if isinstance(raw, Mapping):
         for second, rest in (("sec", "nanosec"), ("secs", "nsecs"), ("sec", "nsec")):
             if second in raw and rest in raw:
@@ -349,7 +349,7 @@ def _number(raw: Any) -> Fraction | int:
 
 
 def _whole(raw: Any, name: str | None, *, natural: bool = False) -> int:
-    """Of a type of ROS, where it is known."""
+    """An integer of a ROS type, if that is known. Raises MappingError."""
     number = _number(raw)
     if number.denominator != 1:
         raise MappingError(f"{show(raw)} is not a whole number")
@@ -368,25 +368,25 @@ def _given(raw: Any, kind: type[T], what: str) -> T:
 
 
 def parts_of(sort: s.Sort) -> tuple[s.Sort, ...]:
-    """What fields are wanted for: a function's parameters (and result), or the value itself."""
+    """The sorts for which fields are needed: a function's parameters (and result), or the value's own sort."""
     if isinstance(sort, s.FunctionSort):
         return sort.parameters if sort.result == s.BOOL else (*sort.parameters, sort.result)
     return (sort,)
 
 
 def table_of(points: Iterable[tuple[Value, ...]], sort: s.FunctionSort) -> dict[tuple[Value, ...], Value]:
-    """The table of a relation that holds at these tuples; of a function with a result, which each has as its last."""
+    """The table of a relation that holds at these tuples, or of a function whose result is the last item of each."""
     return dict.fromkeys(points, True) if sort.result == s.BOOL else {point[:-1]: point[-1] for point in points}
 
 
 def meant(raw: Any, names: Mapping[str, str]) -> str | None:
-    """The contract's name for a message's word or number; None of what is neither."""
+    """The contract's name for a message's word or number; None if it is neither."""
     word = raw if isinstance(raw, str) else str(raw) if raw.__class__ is int else None
     return None if word is None else names.get(word, word)
 
 
 def element(raw: Any, sort: s.EnumSort, names: Mapping[str, str]) -> Value:
-    """The element that a word or a number stands for. Raises MappingError."""
+    """The element that a word or a number denotes. Raises MappingError."""
     word = meant(raw, names)
     if word is not None and word in sort.members:
         return Element(word)

@@ -1,9 +1,9 @@
-"""The steps of a node whose clauses speak of others, where a stamp, key, call or order tells what belongs together.
+"""The steps of clauses that speak of other steps, if a stamp, key, call or order says which messages belong together.
 
-Each topic keeps the order in which its publisher spoke; between topics, nothing does. So a step is what bears one key
-on all topics of the clauses, inputs before outputs, and the steps follow each other as the messages of each topic do:
-this is the word. What no step takes up before the next one (a message was lost, came twice, or bears no key) may have
-been a step that went by unseen.
+Each topic keeps the order of its publisher; there is no order between topics. So a step consists of the messages with
+one key on all topics of the clauses, inputs before outputs, and the steps have the order of the messages of each topic:
+this sequence is the word. Messages that no step contains before the next one (one was lost, came twice, or has no key)
+may have been a step that was not seen.
 """
 
 from __future__ import annotations
@@ -39,11 +39,11 @@ class Message:
     event: Mapping[str, Any]
     index: int
     place: int
-    """In the trace."""
+    """The place in the trace."""
     readers: tuple[tuple[str, Reader], ...]
     """The variables that it carries."""
     missed: bool
-    """Others of its topic before it were lost, or come later, by their numbers."""
+    """Others of its topic before it were lost, or come later, according to their numbers."""
     key: object = None
 
 
@@ -52,7 +52,7 @@ class Step:
     inputs: tuple[Message, ...]
     outputs: tuple[Message, ...]
     whole: bool
-    """It is a step; else these messages belong to none, and some may have gone by unseen."""
+    """It is a step; otherwise these messages belong to no step, and some steps may not have been seen."""
 
     @property
     def missed(self) -> bool:
@@ -61,24 +61,24 @@ class Step:
 
 @dataclass(slots=True)
 class Word:
-    """Puts messages in the order of the word. It keeps at most so many of each topic (`KEYS_KEPT`)."""
+    """Puts messages in the order of the word. It keeps at most `KEYS_KEPT` messages of each topic."""
 
     answers: Answers
     topics: Mapping[str, bool]
-    """Those of the clauses; whether they carry outputs."""
+    """The topics of the clauses, and whether each carries outputs."""
     answered: OrderedDict[int, Mapping[str, tuple[int, ...]]] = field(default_factory=OrderedDict)
     """As `Pairing.answered`."""
     uneven: str = ""
-    """By order: why the answers need not be paired rightly."""
+    """By order: why the answers may be paired wrongly."""
     counts: dict[str, int] = field(default_factory=dict)
-    """By order: the messages of each topic."""
+    """By order: the number of messages of each topic."""
     lost: bool = False
     """By order: as `Pairing.lost`."""
     _queues: dict[str, deque[Message]] = field(default_factory=dict)
     _where: dict[object, set[str]] = field(default_factory=dict)
-    """The topics on which a key waits."""
+    """For each key, the topics on which it waits."""
     _gone: OrderedDict[object, None] = field(default_factory=OrderedDict)
-    """The latest keys that wait no more, or came twice."""
+    """The latest keys that no longer wait, or came twice."""
     _answer: Fraction | None = None
     """By order: the time of the latest answer."""
 
@@ -90,7 +90,7 @@ class Word:
         topic, queue = message.topic, self._queues[message.topic]
         key = self._key(message)
         where = self._where.setdefault(key, set())
-        if key in self._gone or topic in where:  # twice on one topic: nobody knows which of the two is meant
+        if key in self._gone or topic in where:  # twice on one topic: it is unknown which of the two is meant
             self._forget(key)
             key = object()
             where = self._where.setdefault(key, set())
@@ -102,7 +102,7 @@ class Word:
             yield from self._unpaired([queue.popleft()])
 
     def finish(self) -> Iterator[Step]:
-        """The run is over. Inputs that nothing has answered yet are in order among themselves."""
+        """The run is over. Inputs without an answer are in order among themselves."""
         left = {topic: queue for topic, queue in self._queues.items() if queue}
         if self.answers.by == "order":
             answer = -math.inf if self._answer is None else self._answer
@@ -137,7 +137,7 @@ class Word:
         return object() if self.lost else self.counts[topic]
 
     def _reach(self, key: object, topics: Mapping[str, object]) -> Iterator[Step]:
-        """The step of a key, and before it what nothing will take up any more."""
+        """The step of a key, preceded by the messages that can no longer be part of a step."""
         passed: list[Message] = []
         taken: list[Message] = []
         for topic in topics:
@@ -174,7 +174,7 @@ class Word:
 
 
 def follow(monitor: Monitor, steps: Iterable[Step], found: list[Violation]) -> None:
-    """Judge some steps of the word."""
+    """Judge the given steps of the word."""
     now = monitor.events
     for step in steps:
         if step.missed:
@@ -193,7 +193,7 @@ def follow(monitor: Monitor, steps: Iterable[Step], found: list[Violation]) -> N
 
 
 def _pass(monitor: Monitor, names: set[str]) -> None:
-    """Messages with these variables are part of no step: what they left is not known."""
+    """Messages with these variables are part of no step: the values after them are unknown."""
     for watched in monitor.about(names):
         watched.tally.published += 1
         watched.tally.unsure(ALONE)
@@ -204,7 +204,7 @@ def _pass(monitor: Monitor, names: set[str]) -> None:
 
 
 def word_of(setup: Setup, clauses: Iterable[Clause]) -> Word | None:
-    """Of some clauses that are judged together; None where none that speaks of other steps is judged by it."""
+    """The word of some clauses that are judged together; None if it judges none that speaks of other steps."""
     if setup.answers is None or setup.answers.by == "arrival":
         return None
     told = [clause for clause in clauses if not untold(setup, clause)]
@@ -214,7 +214,7 @@ def word_of(setup: Setup, clauses: Iterable[Clause]) -> Word | None:
 
 
 def topics_of(setup: Setup, names: Iterable[str]) -> dict[str, bool]:
-    """The topics that carry some variables; whether these are outputs."""
+    """The topics that carry the given variables, and whether these are outputs."""
     sources = [rule.source if isinstance(rule := setup.rules.get(name), Previous) else name for name in names]
     carried = setup.carried
     return {
@@ -225,7 +225,7 @@ def topics_of(setup: Setup, names: Iterable[str]) -> dict[str, bool]:
 
 
 def untold(setup: Setup, clause: Clause) -> str:
-    """Why `answers` (other than by arrival) does not tell the steps of a clause; empty where it does."""
+    """Why `answers` (other than by arrival) does not determine the steps of a clause; empty if it does."""
     if not histories(clause.formula):
         return ""
     assert setup.answers is not None

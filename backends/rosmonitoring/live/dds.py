@@ -1,8 +1,8 @@
 """A participant of a running ROS 2 graph, over DDS by the package cyclonedds: it needs no ROS package.
 
-A topic's writers are found by DDS's discovery. Each is heard by a reader with the quality of service that it offers, so
-that nothing is missed that it keeps or repeats. What comes together is put into the order of its writers' clocks. How
-types are made, and what a sample holds, is known from the definitions of messages.
+DDS discovery finds a topic's writers. Each is read by a reader with the quality of service that it offers, so that no
+message that it keeps or repeats is missed. Messages that come together are put into the order of their writers' clocks.
+The structure of types, and the content of a sample, are known from the definitions of messages.
 """
 
 from __future__ import annotations
@@ -33,12 +33,12 @@ _TIME = {
     for kind in ("time", "duration")
 }
 _EMPTY = Message("", (Field("structure_needs_at_least_one_member", Scalar("uint8")),))
-"""What ROS 2 makes of a message without fields."""
+"""The field that ROS 2 adds to a message without fields."""
 
 
 @dataclass(slots=True)
 class _Heard:
-    """A topic that is listened to: its type, what reads its samples."""
+    """A topic that is listened to: its type, and the reader of its samples."""
 
     topic: str
     kind: str
@@ -48,7 +48,7 @@ class _Heard:
 
 @dataclass(slots=True)
 class _Reader:
-    """One for all writers of a topic that offer the same quality of service."""
+    """A reader for all writers of a topic that offer the same quality of service."""
 
     heard: _Heard
     entity: Any
@@ -57,22 +57,22 @@ class _Reader:
 
 @dataclass(slots=True)
 class _Writer:
-    """One who writes a topic, and the reader that hears it: others may too, and are not listened to."""
+    """A writer of a topic, and the reader for it: others may receive its samples too, but these are ignored."""
 
     reader: _Reader
     since: float = field(default_factory=time.monotonic)
     settled: bool = False
-    """It is heard, or gone, or has been told of."""
+    """It is matched, or gone, or has been reported."""
 
 
 class Dds:
-    """Hears the topics of a domain; use it as a context."""
+    """Listens to the topics of a domain; use it as a context."""
 
     def __init__(
         self, domain: int, topics: Iterable[str], kinds: Mapping[str, str], known: Definitions, host: str
     ) -> None:
-        """`kinds`: the type of each topic, without its leading slash. `host`: an address of the network at which the
-        nodes are. Raises Rejected for a topic whose type is not known, and without the package cyclonedds."""
+        """`kinds`: the type of each topic, without its leading slash. `host`: an address of the network of the nodes.
+        Raises Rejected for a topic whose type is not known, and without the package cyclonedds."""
         self.inbox = Inbox()
         self._domain, self._host = domain, host
         self._types = _Types(known)
@@ -94,7 +94,7 @@ class Dds:
         self._spoken: list[Any] = []
 
     def __enter__(self) -> Dds:
-        """Raises Rejected where the domain cannot be joined."""
+        """Raises Rejected if the domain cannot be joined."""
         try:
             from cyclonedds.builtin import BuiltinDataReader, BuiltinTopicDcpsPublication
             from cyclonedds.core import DDSException, WaitSet
@@ -122,7 +122,7 @@ class Dds:
         self._thread.join()
 
     def diagnostics(self, topic: str, system: str) -> Callable[[Sequence[Status]], None]:
-        """What says verdicts on a topic."""
+        """A function that publishes verdicts on a topic. Raises Rejected."""
         from cyclonedds.core import DDSException, Qos
         from cyclonedds.pub import DataWriter
         from cyclonedds.qos import Policy
@@ -130,7 +130,7 @@ class Dds:
         from cyclonedds.util import duration
 
         kind = "diagnostic_msgs/DiagnosticArray"
-        types = _Types(Definitions(distribution("humble")))  # the same in every ROS 2 there has been
+        types = _Types(Definitions(distribution("humble")))  # the same in every ROS 2 so far
         qos = Qos(Policy.Reliability.Reliable(duration(seconds=1)), Policy.History.KeepLast(DDS_TAKEN))
         try:
             entity = Topic(self._participant, dds_topic(topic), types.struct(kind))
@@ -167,7 +167,7 @@ class Dds:
             self.inbox.trouble("", f"DDS: {error}")
 
     def _discover(self) -> None:
-        """Who writes what is listened to."""
+        """Find the writers of the topics that are listened to."""
         for found in _all(self._publications):
             handle = found.sample_info.instance_handle
             if not found.sample_info.valid_data:
@@ -184,7 +184,7 @@ class Dds:
             self._writers[handle] = _Writer(self._reader(heard, found.qos))
 
     def _reader(self, heard: _Heard, offered: Any) -> _Reader:
-        """One with the quality of service that a writer offers."""
+        """A reader with the quality of service that a writer offers."""
         from cyclonedds.core import Qos
         from cyclonedds.qos import Policy
         from cyclonedds.sub import DataReader, Subscriber
@@ -194,7 +194,7 @@ class Dds:
         key = (heard.topic, *map(repr, (*taken, *part)))
         if key not in self._readers:
             more = Policy.TypeConsistency.AllowTypeCoercion(ignore_member_names=True)
-            qos = Qos(*taken, Policy.History.KeepAll, more)  # what it drops, it would not say
+            qos = Qos(*taken, Policy.History.KeepAll, more)  # a reader would not report dropped samples
             subscriber = Subscriber(self._participant, Qos(*part)) if part else self._participant
             entity = DataReader(subscriber, heard.entity, qos)
             self._wait.attach(self._condition(entity))
@@ -202,22 +202,22 @@ class Dds:
         return self._readers[key]
 
     def _take(self) -> None:
-        """What has come: of each writer by its own reader, in the order of their clocks."""
+        """Take the new samples: of each writer by its own reader, in the order of their clocks."""
         taken = [(reader, sample) for reader in self._readers.values() for sample in _all(reader.entity)]
         if any(sample.sample_info.publication_handle not in self._writers for _, sample in taken):
-            self._discover()  # one who has come in between
+            self._discover()  # a writer that came in between
         found: list[tuple[int, _Heard, bytes]] = []
         for reader, sample in taken:
             info = sample.sample_info
             writer = self._writers.get(info.publication_handle)
             if info.valid_data and writer is not None and writer.reader is reader:
-                writer.settled = True  # whatever discovery says of it later
+                writer.settled = True  # whatever discovery reports of it later
                 found.append((info.source_timestamp, reader.heard, sample.data))
         for _, heard, data in sorted(found, key=lambda one: one[0]):
             self.inbox.message(heard.topic, partial(_event, heard, data))
 
     def _look(self) -> None:
-        """Tell which writers cannot be heard, and what was lost."""
+        """Report the writers that cannot be heard, and the lost samples."""
         for handle, writer in self._writers.items():
             if writer.settled:
                 continue
@@ -235,7 +235,7 @@ class Dds:
 
 
 def _all(reader: Any) -> Iterator[Any]:
-    """What a reader has, and takes no more of than a little at a time."""
+    """The samples of a reader, taken a limited number at a time."""
     while found := reader.take(DDS_TAKEN):
         yield from found
         if len(found) < DDS_TAKEN:
@@ -250,7 +250,7 @@ def _event(heard: _Heard, data: bytes, now: float) -> Event:
 
 
 class _Types:
-    """The types of some definitions, for cyclonedds (what it tells others of them) and for rosbags, which reads."""
+    """The types of some definitions, for cyclonedds (which announces them) and for rosbags, which reads."""
 
     def __init__(self, known: Definitions) -> None:
         """Raises Rejected without the packages cyclonedds and rosbags."""
@@ -266,7 +266,7 @@ class _Types:
         self._made: dict[str, Any] = {}
 
     def missing(self, kind: str) -> str:
-        """Why a type cannot be heard; empty where it can."""
+        """Why a type cannot be heard; empty if it can."""
         message = self._known.get(kind)
         if message is None:
             return f"nothing defines {kind}"
@@ -282,7 +282,7 @@ class _Types:
         return self._made[kind]
 
     def raw(self, kind: str) -> Any:
-        """As `struct`, for readers: its samples are `_Raw`."""
+        """As `struct`, for readers: its samples are of class `_Raw`."""
         made = self._new(kind)
         made.deserialize = classmethod(lambda cls, data, *more: _Raw(data))
         made.deserialize_key = classmethod(lambda cls, data, *more: _Raw(b""))
@@ -293,7 +293,7 @@ class _Types:
         return self._make(f"{kind.rpartition('/')[2]}_", dds_type(kind), fields)
 
     def reader(self, kind: str) -> Callable[[bytes], dict[str, Any]]:
-        """What a sample holds, as a bag's message would be read; it raises ValueError for what is none."""
+        """A function that reads a sample like a bag's message; it raises ValueError if it is no such message."""
         from rosbags.serde import SerdeError
 
         base, store = self._kind, self._store
@@ -334,7 +334,7 @@ class _Types:
         return message if message.fields else Message(kind, _EMPTY.fields)
 
     def _names(self, message: Message) -> list[str]:
-        """The types that a message is made of, and its own."""
+        """The types that a message consists of, including its own."""
 
         def inner(name: str) -> Iterator[str]:
             for each in self.message(name).fields:
@@ -365,7 +365,7 @@ class _Types:
 
 
 class _Raw:
-    """A sample as it came; cyclonedds sets `sample_info`."""
+    """A sample as it was received; cyclonedds sets `sample_info`."""
 
     def __init__(self, data: bytes) -> None:
         self.data = data
@@ -373,7 +373,7 @@ class _Raw:
 
 
 def _filled(types: _Types, kind: str, values: Mapping[str, Any]) -> Any:
-    """A message to be said, of plain values."""
+    """A message to be published, from plain values."""
 
     def made(wire: Wire, value: Any) -> Any:
         match wire:
@@ -390,7 +390,7 @@ def _filled(types: _Types, kind: str, values: Mapping[str, Any]) -> Any:
 
 
 def _attribute(name: str) -> str:
-    """A field's name as one of Python's."""
+    """A field's name as a Python name."""
     return f"{name}_" if keyword.iskeyword(name) else name
 
 

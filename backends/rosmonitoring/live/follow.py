@@ -1,6 +1,6 @@
-"""A running graph under the monitors: what is heard is judged and recorded, and verdicts are said as ROS diagnostics.
+"""A running graph under the monitors: messages are judged and recorded, verdicts published as ROS diagnostics.
 
-Evidence is the record, judged again by `avow verify`: a live verdict stays what it is, a message to whoever looks.
+The evidence is the record, judged again by `avow verify`: a live verdict is only a message to its reader.
 """
 
 from __future__ import annotations
@@ -34,8 +34,8 @@ def follow(
     running: Session, graph: Graph, over: Callable[[], bool], record: Path | None, verdicts: str | None,
     warn: Callable[[str], None],
 ) -> Iterator[Violation]:  # fmt: skip
-    """Judge what a graph says until it is `over`, and pass on what is filtered. Deadlines pass by this machine's clock.
-    What is judged, and recorded, is marked as heard `LIVE`. Raises Rejected where the record cannot be written."""
+    """Judge the messages of a graph until it is `over`, and pass on those of filtered topics. Deadlines are by this
+    machine's clock. Messages judged and recorded are marked `LIVE`. Raises Rejected if the record cannot be written."""
     running.prompt()
     with ExitStack() as stack:
         try:
@@ -51,7 +51,7 @@ def follow(
         ended: float | None = None
         while True:
             if ended is None and over():
-                ended = time.time()  # what came until then is judged yet
+                ended = time.time()  # messages until then are still judged
             heard = graph.inbox.get(LIVE_PAUSE if ended is None else 0)
             if ended is not None and (heard is None or heard.time > ended):
                 break
@@ -83,14 +83,14 @@ def follow(
 
 
 class Troubles:
-    """What could not be read, or who could not be heard; each is told once."""
+    """Messages that could not be read, and publishers that could not be heard; each is reported once."""
 
     def __init__(self, warn: Callable[[str], None]) -> None:
         self._warn = warn
         self._told: set[str] = set()
 
     def event(self, heard: Heard) -> Event | None:
-        """What a message says; one that cannot be read says nothing of its fields, so that they are unknown."""
+        """The event of a message; an unreadable one has no fields, so that they are unknown."""
         if heard.read is None:
             self.tell(heard.trouble)
             return None
@@ -107,7 +107,7 @@ class Troubles:
 
 
 class Board:
-    """The verdicts on a topic: each clause a status, at once when one is broken, else once a second."""
+    """Publishes the verdicts on a topic: a status for each clause, at once if one is broken, or once a second."""
 
     def __init__(self, running: Session, graph: Graph, topic: str) -> None:
         self.running = running
@@ -120,7 +120,7 @@ class Board:
         self._next = 0.0
 
     def refresh(self) -> None:
-        """Say how it stands, if it is time to."""
+        """Publish the verdicts, if they are due."""
         if time.monotonic() >= self._next:
             self.say()
 
@@ -129,7 +129,7 @@ class Board:
         self._say(list(self.standing()))
 
     def standing(self) -> Iterator[Status]:
-        """Each clause, and each other thing that was told."""
+        """The status of each clause, and of each other violation."""
         told = dict(self._latest)
         for monitor, clause, _, tally in self.running.clauses():
             name = f"{monitor.setup.node.name}.{clause}"

@@ -1,4 +1,4 @@
-"""What a running graph is to those that judge it: `ros1`, `dds` and `rosbridge` are three."""
+"""The interface of a running graph to the code that judges it: `ros1`, `dds` and `rosbridge` implement it."""
 
 from __future__ import annotations
 
@@ -20,19 +20,19 @@ OK, WARN, ERROR, STALE = range(4)
 
 @dataclass(frozen=True, slots=True)
 class Heard:
-    """One message, when it came, and what reads it (which raises ValueError); or (`read` None) what is wrong with who
-    said it."""
+    """One message, the time at which it came, and its reader (which raises ValueError); or (`read` None) the trouble
+    with its publisher."""
 
     topic: str
     time: float
     read: Callable[[], Event] | None
     trouble: str = ""
     forward: Callable[[], None] | None = None
-    """Of a topic that is filtered: passes the message on."""
+    """For a filtered topic: passes the message on."""
 
 
 class Inbox:
-    """What waits to be judged, in the order of the times at which it came, whichever thread hears it."""
+    """The messages that wait to be judged, in the order of arrival, whichever thread receives them."""
 
     def __init__(self) -> None:
         self._queue: queue.Queue[Heard] = queue.Queue(QUEUED_MESSAGES)
@@ -56,7 +56,7 @@ class Inbox:
             self.dropped += 1
 
     def get(self, seconds: float) -> Heard | None:
-        """The next one, or None if none comes for so long."""
+        """The next one, or None if none comes within `seconds`."""
         try:
             return self._queue.get(timeout=seconds)
         except queue.Empty:
@@ -65,7 +65,7 @@ class Inbox:
 
 @dataclass(frozen=True, slots=True)
 class Status:
-    """One clause's standing, as ROS's diagnostics have it."""
+    """One clause's status, as in ROS's diagnostics."""
 
     name: str
     level: int
@@ -85,7 +85,7 @@ class Status:
 
 
 class Graph(Protocol):
-    """Used as a context: it listens until that is left."""
+    """Use it as a context: it listens until that is left."""
 
     inbox: Inbox
 
@@ -96,5 +96,5 @@ class Graph(Protocol):
     ) -> None: ...
 
     def diagnostics(self, topic: str, system: str) -> Callable[[Sequence[Status]], None]:
-        """What says verdicts on a topic, as `diagnostic_msgs/DiagnosticArray`."""
+        """A function that publishes verdicts on a topic, as `diagnostic_msgs/DiagnosticArray`."""
         ...

@@ -1,7 +1,7 @@
-"""A participant of a running ROS 1 graph: it hears topics and says verdicts, and needs no ROS package.
+"""A participant of a running ROS 1 graph: it listens to topics and publishes verdicts, and needs no ROS package.
 
-ROS's protocols: the master's and the nodes' XML-RPC interfaces, and TCPROS: a header of `name=value` fields, then one
-length and one message after the other. The header of a publisher's answer has the full definition of its messages.
+ROS's protocols: the master's and the nodes' XML-RPC interfaces, and TCPROS: a header of `name=value` fields, then
+messages, each after its length. The header of a publisher's answer has the full definition of its messages.
 """
 
 from __future__ import annotations
@@ -40,15 +40,15 @@ class _Server(ThreadingMixIn, SimpleXMLRPCServer):
 
 
 class Ros1:
-    """Hears the topics of a graph; use it as a context."""
+    """Listens to the topics of a graph; use it as a context."""
 
     def __init__(
         self, master: str, topics: Iterable[str], host: str = HOST, filtered: Set[str] = frozenset(),
         warn: Callable[[str], None] = lambda text: None,
     ) -> None:  # fmt: skip
-        """`host`: the name or address at which the graph's nodes find this one. `filtered`: of these topics (without
-        their leading slash) only what is passed on is published, of what is said where `raw` calls it. `warn`: is told
-        that a master is waited for."""
+        """`host`: the name or address at which the graph's nodes find this one. `filtered`: topics (without their
+        leading slash) on which only the messages that are passed on are published; their nodes publish under the name
+        that `raw` returns. `warn` receives a message while a master is awaited."""
         self.host = host
         self._warn = warn
         topics = tuple(topic if topic.startswith("/") else f"/{topic}" for topic in topics)
@@ -57,14 +57,14 @@ class Ros1:
         self.inbox = Inbox()
         self._uri = master
         self._heard: dict[tuple[str, str], threading.Event] = {}
-        """(topic, publisher) → set once the master names it no more."""
+        """(topic, publisher) → set once the master no longer names it."""
         self._lock = threading.Lock()
         self._over = threading.Event()
         self._spoken: dict[str, Spoken] = {}
         self._speaking = threading.Lock()
 
     def __enter__(self) -> Ros1:
-        """Raises Rejected where no master answers, also not while it is asked again for some seconds."""
+        """Raises Rejected if no master answers within some seconds."""
         self._slave = _Server((self.host, 0), logRequests=False, allow_none=True)
         calls: dict[str, Any] = {"publisherUpdate": self._publishers, "requestTopic": self._requested}
         for name, call in calls.items():
@@ -95,7 +95,7 @@ class Ros1:
         self._slave.server_close()
 
     def _forward(self, topic: str, fields: Mapping[str, str]) -> Callable[[bytes], None] | None:
-        """What passes a topic's messages on, as they are; None for one that is not filtered."""
+        """A function that passes a topic's messages on unchanged; None for a topic that is not filtered."""
         target = self._filtered.get(topic)
         if target is None:
             return None
@@ -116,7 +116,7 @@ class Ros1:
         return spoken
 
     def diagnostics(self, topic: str, system: str) -> Callable[[Sequence[Status]], None]:
-        """What says verdicts on a topic."""
+        """A function that publishes verdicts on a topic. Raises Rejected."""
         store, full = get_typestore(Stores.ROS1_NOETIC), "diagnostic_msgs/msg/DiagnosticArray"
         definition, digest = store.generate_msgdef(full, ros_version=1)
         spoken = self.speak(topic, "diagnostic_msgs/DiagnosticArray", definition, digest)
@@ -141,7 +141,7 @@ class Ros1:
         return say
 
     def _asked(self, call: str, *arguments: Any) -> tuple[int, str, Any]:
-        """What the master says, which may be about to start. Raises Rejected."""
+        """The answer of the master, which may be starting up. Raises Rejected."""
         for attempt in range(MASTER_ATTEMPTS):
             try:
                 with interface(self._uri) as master:
@@ -159,14 +159,14 @@ class Ros1:
         return code, text, value
 
     def _requested(self, caller: str, topic: str, protocols: list[Any]) -> tuple[int, str, Any]:
-        """A subscriber asks for what is spoken."""
+        """A subscriber requests a topic that is published here."""
         spoken = self._spoken.get(topic)
         if spoken is None:
             return 0, "not published here", []
         return 1, "", ["TCPROS", self.host, spoken.port]
 
     def _publishers(self, caller: str, topic: str, publishers: list[str]) -> tuple[int, str, int]:
-        """The master says who publishes a topic now."""
+        """The master reports the current publishers of a topic."""
         with self._lock:
             if topic in self._filtered.values():
                 for uri in publishers:
@@ -183,12 +183,12 @@ class Ros1:
         return 1, "", 0
 
     def _listen(self, topic: str, uri: str, gone: threading.Event) -> None:
-        """Hear one publisher of a topic for as long as the master names it; where it cannot be reached, or breaks off,
-        again."""
+        """Listen to one publisher of a topic while the master names it; retry if it cannot be reached or closes the
+        connection."""
         while not (self._over.is_set() or gone.is_set()):
             try:
                 self._hear(topic, uri, gone)
-            except (ValueError, Rejected) as error:  # what it says cannot be read, now or later
+            except (ValueError, Rejected) as error:  # its messages cannot be read, now or later
                 self._trouble(topic, uri, str(error))
                 break
             except FAILURES as error:
@@ -204,7 +204,7 @@ class Ros1:
             self.inbox.trouble(topic, f"{topic} from {uri}: {text}")
 
     def _hear(self, topic: str, uri: str, gone: threading.Event) -> None:
-        """Hear one publisher until the connection is closed. Raises Rejected, ValueError, and those of `FAILURES`."""
+        """Listen to one publisher until the connection closes. Raises Rejected, ValueError, and those of `FAILURES`."""
         with interface(uri) as other:
             code, text, protocol = other.requestTopic(CALLER, topic, [["TCPROS"]])
         if code != 1 or not isinstance(protocol, list) or len(protocol) != 3:
@@ -213,7 +213,7 @@ class Ros1:
             wanted = {"callerid": CALLER, "topic": topic, "type": "*", "md5sum": "*", "tcp_nodelay": "1"}
             line.sendall(header(wanted))
             fields = read_header(line)
-            line.settimeout(None)  # from now on silence is its right
+            line.settimeout(None)  # from now on it may be silent
             read = reader(topic, fields)
             forward = self._forward(topic, fields)
             while not (self._over.is_set() or gone.is_set()):
@@ -227,7 +227,7 @@ def _event(topic: str, by: str, read: Callable[[bytes], dict[str, Any]], raw: by
 
 
 class Spoken:
-    """A topic that is published; `latch`: the latest message is kept for whoever comes later."""
+    """A topic that is published; `latch`: the latest message is kept for later subscribers."""
 
     def __init__(self, host: str, topic: str, fields: Mapping[str, str], *, latch: bool = True) -> None:
         self.topic = topic
@@ -264,7 +264,7 @@ class Spoken:
                     line.sendall(self._latest)
                 except OSError:
                     self._lines.remove(line)
-                    line.close()  # half a message may be on it
+                    line.close()  # half a message may have been sent on it
 
     def close(self) -> None:
         self._listening.close()
@@ -273,14 +273,14 @@ class Spoken:
 
 
 def header(fields: Mapping[str, str]) -> bytes:
-    """TCPROS's header."""
+    """A TCPROS header."""
     parts = [f"{name}={value}".encode() for name, value in fields.items()]
     whole = b"".join(struct.pack("<I", len(part)) + part for part in parts)
     return struct.pack("<I", len(whole)) + whole
 
 
 def read_header(line: socket.socket) -> dict[str, str]:
-    """Raises ValueError for what is none, or says that the other side refuses."""
+    """Raises ValueError if it is no header, or reports that the other side refuses."""
     raw, found, at = frame(line, HEADER_BYTES), {}, 0
     while at < len(raw):
         if at + 4 > len(raw):
@@ -301,7 +301,7 @@ class Gone(EOFError, OSError):  # noqa: N818 - it says what the other side is
 
 
 def frame(line: socket.socket, most: int) -> bytes:
-    """The next length and as many bytes. Raises ValueError for more than there may be, Gone at the end."""
+    """The next length and that many bytes. Raises ValueError if the length exceeds `most`, Gone at the end."""
     (length,) = struct.unpack("<I", _exactly(line, 4))
     if length > most:
         raise ValueError(f"{length} bytes are more than {most}")

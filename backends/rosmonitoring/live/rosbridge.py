@@ -1,7 +1,7 @@
 """A graph behind rosbridge: its topics as JSON over a WebSocket, for ROS 1 and ROS 2 alike.
 
-rosbridge says neither how messages are made (that is the plan's to say) nor whether any were lost, and its JSON has
-null where a number is NaN or infinite: unreadable, never a value.
+rosbridge gives neither the definitions of messages (the plan has to) nor the number of those lost, and its JSON has
+null for a number that is NaN or infinite: unreadable, never a value.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from .graphs import Inbox, Status
 
 
 class Rosbridge:
-    """Hears the topics of a graph; use it as a context."""
+    """Listens to the topics of a graph; use it as a context."""
 
     def __init__(self, address: str, topics: Iterable[str]) -> None:
         self.address = address
@@ -30,7 +30,7 @@ class Rosbridge:
         self._stack = ExitStack()
 
     def __enter__(self) -> Rosbridge:
-        """Raises Rejected where nobody answers, or without the package websockets."""
+        """Raises Rejected if no rosbridge answers, or without the package websockets."""
         try:
             from websockets.exceptions import WebSocketException
             from websockets.sync.client import connect
@@ -54,7 +54,7 @@ class Rosbridge:
         self._line.send(json.dumps(message))
 
     def _say(self, message: dict[str, Any]) -> None:
-        """As `_send`; that there is nobody any more is told, not raised."""
+        """As `_send`; a closed connection is reported, not raised."""
         from websockets.exceptions import WebSocketException
 
         try:
@@ -85,7 +85,7 @@ class Rosbridge:
             self.inbox.trouble("", "rosbridge said what is no message")
 
     def diagnostics(self, topic: str, system: str) -> Callable[[Sequence[Status]], None]:
-        """What says verdicts on a topic."""
+        """A function that publishes verdicts on a topic."""
         self._say({"op": "advertise", "topic": topic, "type": "diagnostic_msgs/DiagnosticArray"})
 
         def say(statuses: Sequence[Status]) -> None:

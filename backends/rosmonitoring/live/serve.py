@@ -1,8 +1,8 @@
-"""ROSMonitoring's oracle protocol over a WebSocket: our engine where the RML oracle stands.
+"""ROSMonitoring's oracle protocol over a WebSocket: our engine in place of the RML oracle.
 
-One text frame an event, one reply each: the event with a `verdict`. A reply without one would be read as a final
+One text frame for each event, one reply each: the event with a `verdict`. A reply without one would be read as a final
 "true", and a final verdict ends the monitoring, so the answers are always ``currently_true`` or ``currently_false``.
-Each connection has monitors of its own, that begin with it.
+Each connection has its own monitors, which begin with it.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ HOST = "127.0.0.1"
 
 
 def answer(session: Session, frame: str | bytes) -> str:
-    """The reply to one frame. Never raises for what the frame holds."""
+    """The reply to one frame. Never raises, whatever the frame contains."""
     try:
         text = frame.decode() if isinstance(frame, bytes) else frame
         event = parse_event(text)
@@ -39,7 +39,7 @@ def answer(session: Session, frame: str | bytes) -> str:
 
 
 def serve(make: Callable[[], Session], port: int, ready: Callable[[Any], None] | None = None) -> None:
-    """Serve until interrupted. `ready` is given the server (its `socket` has the port). Raises Rejected."""
+    """Serve until interrupted. `ready` receives the server (its `socket` has the port). Raises Rejected."""
     try:
         from websockets.exceptions import ConnectionClosed
         from websockets.sync.server import serve as listen

@@ -1,7 +1,7 @@
 """A guarantee without its quantifiers, as an RML condition over the numbers that its equation carries.
 
 The one-point rule: ``exists(x, y in REAL | in.at(x, y) and …)`` is what follows "and" at the one tuple of in.at,
-``exists(x | out.command == move(x, 0) and …)`` what follows at the command's argument. Where that does not bind every
+``exists(x | out.command == move(x, 0) and …)`` what follows at the command's argument. If that does not bind every
 variable, the guarantee is refused with the reason; nothing is approximated.
 """
 
@@ -33,7 +33,7 @@ _NOT_LIFTED = "it stands in a quantified formula within a term"
 Bound = Mapping[str, Symbol]
 
 _Case = tuple[rml.Condition, list[Part], Bound]
-"""One way in which a part can hold: what says so, what has to hold besides, and what it fixes."""
+"""One way in which a part can hold: the condition for it, the remaining parts, and the variables that it fixes."""
 
 
 @dataclass(slots=True)
@@ -44,7 +44,7 @@ class Eliminator:
     _work: int = 0
 
     def condition(self, formula: t.Term) -> rml.Condition:
-        """Raises NotRml with the reason why the formula is none."""
+        """Raises NotRml with the reason if the formula is not expressible."""
         try:
             found = self._formula(rename_apart(lifted(self._without_functions(formula))), {})
         except TooManyCases:
@@ -58,7 +58,7 @@ class Eliminator:
         return found
 
     def _without_functions(self, formula: t.Term) -> t.Term:
-        """Each value of a function with a result as a choice: at its known arguments, or elsewhere."""
+        """Replace each value of a function with a result by a choice: at its known arguments, or elsewhere."""
         made = dict(self.symbols)
 
         def part(name: str, symbol: Symbol, sort: s.Sort) -> t.Variable:
@@ -225,7 +225,7 @@ class Eliminator:
         return rml.Calculation(operator, left, right)
 
     def _unique(self, term: t.Quantified, bound: Bound) -> rml.Condition:
-        """One, and no other."""
+        """Exactly one."""
         copy = rename_apart(t.And((term, term)))
         assert isinstance(copy, t.And)
         one, other = copy.items
@@ -252,8 +252,8 @@ class Eliminator:
     def _solve(
         self, parts: Sequence[Part], variables: Sequence[t.Variable], bound: Bound, given: rml.Condition
     ) -> rml.Condition:
-        """That some values of the free variables meet all parts. `given`: what holds around; where that contradicts the
-        parts, nothing has to fix a variable."""
+        """The condition that some values of the free variables meet all parts. `given`: the facts that hold around it;
+        if they contradict the parts, no variable has to be fixed."""
         self._tick()
         free = {v.name: v for v in variables if v.name not in bound}
         ready = [p for p in parts if not p.names & free.keys()]
@@ -302,7 +302,7 @@ class Eliminator:
         return found if part.positive else rml.opposite(found)
 
     def _binders(self, part: Part, free: Mapping[str, t.Variable], bound: Bound) -> list[_Case] | None:
-        """The ways in which a part can hold, each with what it fixes; None if the part fixes nothing."""
+        """The ways in which a part can hold, each with the variables that it fixes; None if the part fixes nothing."""
         match part.term:
             case t.Apply(
                 function=t.Variable(
@@ -333,7 +333,7 @@ class Eliminator:
     def _case(
         self, left: t.Term, right: t.Term, free: Mapping[str, t.Variable], bound: Bound, holds: rml.Condition = rml.TRUE
     ) -> _Case | None:
-        """That both sides are the same, where that fixes a variable."""
+        """The case that both sides are equal, if that fixes a variable."""
         found = solved(t.Compare("==", left, right), free.values())
         if found is None:
             return None

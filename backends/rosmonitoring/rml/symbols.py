@@ -2,7 +2,7 @@
 
 An enumeration's element is a code (1, 2, …), a truth value 0 or 1, an algebraic value its constructor's code and the
 arguments of every constructor; a relation that holds of the latest message's tuple is a flag and that tuple. The
-scenario's tables are known beforehand. Anything else (a relation that holds of all tuples seen) is refused.
+scenario's tables are known in advance. Anything else (a relation that holds of all tuples seen) is refused.
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ def choice_cases(rule: Choice, sort: DataSort, stem: str) -> list[Case]:
 
 
 def binds_of(stem: str, paths: Sequence[FieldPath]) -> list[str]:
-    """Names for what a message's fields hold: after the fields, if these differ."""
+    """Names for the contents of a message's fields: the fields' names, if these differ."""
     fields = [re.sub("[^A-Za-z0-9]", "", str(path[-1])) if path else "" for path in paths]
     if len(paths) == 1:
         return [stem]
@@ -167,14 +167,14 @@ class Points:
 
 @dataclass(frozen=True, slots=True)
 class Tracked:
-    """A relation that holds of every tuple seen, where only known tuples are asked for: a number for each of these, 1
-    once it has been seen. The tuples are collected while the condition is made."""
+    """A relation that holds of every tuple seen, if it is applied only to known tuples: a number for each of these, 1
+    once it has been seen. The tuples are collected while the condition is built."""
 
     prefix: str
     flags: dict[tuple[Fraction, ...], str] = field(default_factory=dict, hash=False)
 
     def flag(self, arguments: tuple[Symbol, ...]) -> Condition:
-        """When the relation holds there. Raises NotRml."""
+        """The condition that the relation holds there. Raises NotRml."""
         at: list[Fraction] = []
         for argument in arguments:
             if not isinstance(argument, Scalar) or not isinstance(argument.number, Number):
@@ -190,7 +190,7 @@ class Tracked:
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """A function with a result: its value at these arguments, and everywhere else."""
+    """A function with a result: its value at these arguments, and its value elsewhere."""
 
     points: tuple[tuple[tuple[Symbol, ...], Symbol], ...]
     elsewhere: Symbol
@@ -200,7 +200,7 @@ Symbol = Scalar | Variant | Points | Tracked | Table
 
 
 def code(sort: s.EnumSort | s.DataSort, name: str) -> int:
-    """The number that stands for an element or a constructor; 0 stands for none."""
+    """The number that represents an element or a constructor; 0 represents none."""
     names = sort.members if isinstance(sort, s.EnumSort) else tuple(c.name for c in sort.constructors)
     return names.index(name) + 1
 
@@ -236,7 +236,7 @@ def constant(value: Value, sort: s.Sort) -> Symbol:
 
 
 def blank(sort: s.Sort) -> Symbol:
-    """What stands in the places of a value that is not there."""
+    """The number in the places of an absent value. Raises NotRml."""
     if isinstance(sort, s.NotScalar):
         raise NotRml("an argument of a constructor that is no number, truth value or enumeration")
     return Scalar(Number(Fraction(0)))
@@ -284,7 +284,7 @@ def _named(sort: s.Sort, prefix: str, name: str) -> Symbol:
 
 
 def no_pattern(rule: Fields) -> str:
-    """Why no pattern of RML reads what the rule reads; empty where one does."""
+    """Why no RML pattern reads the fields that the rule reads; empty if one does."""
     if rule.take is not None:
         return "calculated from the items of an array"
     if rule.gaps or (rule.elsewhere is not None and not isinstance(rule.variable.sort, s.FunctionSort)):
@@ -297,7 +297,7 @@ def no_pattern(rule: Fields) -> str:
 
 
 def equal(left: Symbol, right: Symbol) -> Condition:
-    """When two symbols of one sort stand for the same value. Raises NotRml."""
+    """The condition that two symbols of one sort have the same value. Raises NotRml."""
     match left, right:
         case Scalar(number=one), Scalar(number=other):
             return compare("==", one, other)
@@ -326,7 +326,7 @@ def components(symbol: Symbol) -> tuple[str, ...]:
             return (flag, *(part for p in parts for part in components(p)))
         case Table(points=((arguments, result),)):
             return tuple(part for symbol in (*arguments, result) for part in components(symbol))
-        case Scalar() | Variant() | Points() | Table():  # known beforehand
+        case Scalar() | Variant() | Points() | Table():  # known in advance
             return ()
         case _:
             assert_never(symbol)

@@ -1,4 +1,4 @@
-"""RML specifications as data, and their text. The tests read back what is written here."""
+"""RML specifications as data, and their text. The tests read back the text that this module writes."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ STRING = re.compile(r"[A-Za-z0-9_./ -]*\Z")
 
 
 class NotRml(Exception):  # noqa: N818 - it says what a text or a formula is
-    """Something that RML cannot say; the text says what, for people."""
+    """Something that RML cannot express; the text gives the reason, for people."""
 
 
 # -- numbers and conditions --------------------------------------------------------------------------------------------
@@ -75,7 +75,7 @@ TRUE, FALSE = Every(), Some()
 
 
 def compare(operator: str, left: Numeric, right: Numeric) -> Condition:
-    """A comparison, decided at once where both sides are numbers."""
+    """A comparison, decided at once if both sides are numbers."""
     if isinstance(left, Number) and isinstance(right, Number):
         a, b = left.value, right.value
         holds = {"<": a < b, "<=": a <= b, ">": a > b, ">=": a >= b, "==": a == b, "!=": a != b}[operator]
@@ -86,7 +86,7 @@ def compare(operator: str, left: Numeric, right: Numeric) -> Condition:
 
 
 def every(items: list[Condition] | tuple[Condition, ...]) -> Condition:
-    """All of them; FALSE where a comparison contradicts what the others leave."""
+    """The conjunction; FALSE if a comparison contradicts the rest."""
     found = joined(items, Every, TRUE, FALSE, once=True)
     excluded = {opposite(item) for item in _parts(found, Every) if isinstance(item, Comparison)}
     kept = [
@@ -99,7 +99,7 @@ def every(items: list[Condition] | tuple[Condition, ...]) -> Condition:
 
 
 def some(items: list[Condition] | tuple[Condition, ...]) -> Condition:
-    """One of them; TRUE where one is another's opposite."""
+    """The disjunction; TRUE if one item is another's opposite."""
     found = joined(items, Some, FALSE, TRUE, once=True)
     implied = {opposite(item) for item in _parts(found, Some) if isinstance(item, Comparison)}
     return TRUE if any(item in implied for item in _parts(found, Some)) else found
@@ -120,13 +120,13 @@ def opposite(condition: Condition) -> Condition:
 
 
 def negations(complete: Condition) -> list[Condition]:
-    """Of the parts of a condition that says that all values are there: in each, one or more are still missing."""
+    """For each part of a condition that all values are present, the condition that it is missing."""
     parts = complete.items if not isinstance(complete, Comparison) else (complete,)
     return [compare("!=", p.left, p.right) for p in parts if isinstance(p, Comparison)]
 
 
 def substitute(condition: Condition, new: Mapping[str, Numeric]) -> Condition:
-    """The condition with numbers in the place of names."""
+    """The condition with numbers substituted for names."""
     if isinstance(condition, Comparison):
         return compare(condition.operator, _put(condition.left, new), _put(condition.right, new))
     items = [substitute(item, new) for item in condition.items]
@@ -146,8 +146,8 @@ def _put(number: Numeric, new: Mapping[str, Numeric]) -> Numeric:
 
 
 def without_exclusions(condition: Condition, name: Name) -> Condition | None:
-    """That the condition holds for some of infinitely many numbers, if all that it says of them is that they are not
-    certain ones: finitely many are excluded then. None where it says more."""
+    """The condition that `condition` holds for some of infinitely many numbers, if it only excludes certain numbers:
+    these are finitely many. None if it says more."""
     match condition:
         case Comparison(operator="!=", left=left, right=right) if _slope(left, name) != _slope(right, name):
             return TRUE if None not in (_slope(left, name), _slope(right, name)) else None
@@ -160,7 +160,7 @@ def without_exclusions(condition: Condition, name: Name) -> Condition | None:
 
 
 def _slope(number: Numeric, name: Name) -> int | None:
-    """How often the name is added in a sum; None for what is no sum."""
+    """How often the name is added in a sum; None if it is no sum."""
     match number:
         case Name() | Number():
             return int(number == name)
@@ -227,11 +227,11 @@ class Specification:
     events: tuple[EventType, ...]
     machines: tuple[Machine, ...]
     notes: dict[str, str] = field(default_factory=dict)
-    """Machine → a comment that goes before it."""
+    """Machine → the comment before it."""
 
 
 def string(text: str) -> str:
-    """A quoted constant. Raises NotRml where the text has characters that RML's strings lack."""
+    """A quoted constant. Raises NotRml if the text has characters that RML's strings lack."""
     if not STRING.match(text):
         raise NotRml(f"RML has no string constant for {text!r}")
     return f"'{text}'"
@@ -245,14 +245,14 @@ def key(text: str) -> str:
 
 
 def comment(text: str) -> str:
-    """One line of comment, whatever the text holds."""
+    """One line of comment, whatever the text contains."""
     clean = "".join(c if c.isprintable() else " " for c in text)
     return f"// {clean}"
 
 
 def number(value: Fraction) -> str:
-    """A non-negative decimal: of at most fifteen digits, or the shortest that means a number which a double holds.
-    Raises NotRml where there is none."""
+    """A non-negative decimal: of at most fifteen digits, or the shortest that denotes a number which a double holds.
+    Raises NotRml if there is none."""
     text = decimal(value)
     return _of_double(value) if text is None or len(text.partition(".")[2]) > 15 else text
 

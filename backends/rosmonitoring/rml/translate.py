@@ -1,9 +1,9 @@
 """A node's guarantees as an RML specification over the events of its topics; correct, or refused with the reason.
 
-A guarantee relates the latest values of several topics, so its equation carries them: `Low<set_r, last_r>` becomes,
-by an event of the topic of r, `Low<1, r>` with r from the event. The event at which the guarantee is judged has an
-event type whose `with` condition is the guarantee without quantifiers (`quantifiers`). If it fails no event type
-matches, and the monitor's answer is false. A message that its rule cannot read matches no event type either.
+A guarantee relates the latest values of several topics, so its equation carries them: by an event of the topic of r,
+`Low<set_r, last_r>` becomes `Low<1, r>` with r from the event. The event at which the guarantee is judged has an event
+type whose `with` condition is the guarantee without quantifiers (`quantifiers`). If it fails, no event type matches,
+and the monitor's answer is false. A message that its rule cannot read matches no event type either.
 """
 
 from __future__ import annotations
@@ -36,14 +36,14 @@ from .quantifiers import Eliminator
 
 @dataclass(frozen=True, slots=True)
 class Translation:
-    """The file's text, and for each guarantee that is not in it the reason."""
+    """The file's text, and the reason for each guarantee that is not in it."""
 
     text: str
     refused: dict[str, str]
 
 
 def translate(setup: Setup, guarantees: Sequence[Clause]) -> Translation:
-    """Never raises for what the contract or the plan hold."""
+    """Never raises, whatever the contract or the plan contain."""
     file = _File(setup)
     refused: dict[str, str] = {}
     for clause in guarantees:
@@ -71,7 +71,7 @@ _Event = tuple[tuple[str, ...], tuple[str, ...], rml.Condition]
 
 
 class _File:
-    """What a node's machines share: event types, each once, and names that nothing else has."""
+    """The parts that a node's machines share: event types, each once, and unique names."""
 
     def __init__(self, setup: Setup) -> None:
         self.setup = setup
@@ -80,11 +80,11 @@ class _File:
         self._events: dict[_Event, str] = {}
         self._taken: set[str] = {*rml.KEYWORDS, "main", "fresh", "last", "set"}
         self.stems = {name: self.name(name.partition(".")[2]) for name in setup.rules}
-        """Variable → what the names of its parts begin with."""
+        """Variable → the prefix of the names of its parts."""
 
     def name(self, wanted: str, suffix: str = "") -> str:
-        """A name in RML that looks like a contract's, given once. It has no `_` but that of the suffix: names that
-        begin or end with it and a `_` are its own."""
+        """A name in RML that resembles a contract's; each is given once. It has no `_` except that of the suffix, so
+        that names that begin or end with it and a `_` are unique."""
         first, *words = re.findall("[A-Za-z0-9]+", wanted) or ["x"]
         text = "".join((first[0].lower() + first[1:], *(word[0].upper() + word[1:] for word in words)))
         text = text if text[0].isalpha() else f"x{text}"
@@ -116,8 +116,8 @@ class _File:
 
 @dataclass(frozen=True, slots=True)
 class _Mode:
-    """One way to take an event: what it has to satisfy, the numbers that it then sets besides those of its fields, and
-    whether it ends an answer."""
+    """One way to take an event: its condition, the numbers that it sets besides those of its fields, and whether it
+    ends an answer."""
 
     guard: rml.Condition
     sets: dict[str, rml.Numeric]
@@ -141,11 +141,11 @@ class _Draft:
         return (*self.binds, *self.used), (sym.pattern(self.topic, self.fields),), self.guard
 
     def called(self, clause: str) -> tuple[str, str]:
-        """What its event type is called: after the clause if that is judged at it, else after the topic."""
+        """The name of its event type: from the clause if that is judged at it, otherwise from the topic."""
         return (clause, "_ok") if self.judged else (self.topic.rpartition("/")[2], "_event")
 
     def with_other(self, other: _Draft) -> _Draft | None:
-        """Both as one, where they differ in one field's constants only."""
+        """Both as one, if they differ only in one field's constants; otherwise None."""
         if replace(self, fields=other.fields) != other or len(self.fields) != len(other.fields):
             return None
         pairs = list(zip(self.fields, other.fields, strict=True))
@@ -166,7 +166,7 @@ class _Machine:
     flags: dict[str, str] = field(default_factory=dict)
     """Variable without an initial value → name of the number that is 1 once it has one."""
     fresh: dict[str, str] = field(default_factory=dict)
-    """Of several outputs: each → name of the number that is 1 once it has been published since the last judgement."""
+    """Each of several outputs → name of the number that is 1 once it has been published since the last judgement."""
 
     drafts: list[_Draft] = field(init=False)
     state: tuple[str, ...] = field(init=False)
@@ -215,7 +215,7 @@ class _Machine:
         self.relevant = (), tuple(sym.pattern(self._written(topic), ()) for topic in by_topic), rml.TRUE
 
     def _modes(self, judged: rml.Condition, updated: Sequence[str], triggers: Sequence[str]) -> list[_Mode]:
-        """As `engine.Monitor` has it: judged once each of its outputs has been published anew, and not before."""
+        """As in `engine.Monitor`: judged once each of its outputs has been published again, and not before."""
         mine = [n for n in triggers if n in updated]
         if not mine:
             return [_Mode(rml.TRUE, {}, judged=False)]
@@ -274,7 +274,7 @@ class _Machine:
         return rule.initial
 
     def _written(self, topic: str) -> str:
-        """The topic's name as the configuration has it."""
+        """The topic's name as in the configuration."""
         for name in (*(name for name, _ in self.setup.named), *self.setup.topics):
             if same_topic(name) == topic:
                 return name
@@ -328,8 +328,8 @@ class _Machine:
     def _follow(
         self, name: str, rule: Previous, updated: Sequence[str], new: dict[str, rml.Numeric], mode: _Mode
     ) -> dict[str, rml.Numeric]:
-        """The previous value, for the next event: the source's value as it is after this one, once it has one. Of one
-        of several outputs: the value that it had in the answer that has just been judged."""
+        """The previous value, for the next event: the source's value after this event, once it has one. If the source
+        is one of several outputs: the value that it had in the answer that has just been judged."""
         if not (mode.judged if rule.source in self.fresh else rule.source in updated):
             return {}
         mine, theirs = sym.components(self.symbols[name]), sym.components(self.symbols[rule.source])
@@ -365,7 +365,7 @@ class _Machine:
 
 
 def _merged(drafts: Iterable[_Draft]) -> list[_Draft]:
-    """Drafts that differ in a field's constants only, as one."""
+    """Merge drafts that differ only in a field's constants."""
     found: list[_Draft] = []
     for draft in drafts:
         both = ((k, joined) for k, other in enumerate(found) if (joined := other.with_other(draft)) is not None)
@@ -376,7 +376,7 @@ def _merged(drafts: Iterable[_Draft]) -> list[_Draft]:
 
 def _tracked_case(symbol: sym.Tracked, parts: Sequence[sym.Case]) -> sym.Case:
     """A message sets the number of its tuple to 1: ``1 - (1 - n) * min(1, |value - asked|)``. RML's own monitor
-    evaluates an argument only if it is a sum or a product at the top."""
+    evaluates an argument only if its outermost operator is a sum or a product."""
     whole = sym.together((), parts)
     one, nothing = rml.Number(Fraction(1)), rml.Number(Fraction(0))
     values: list[rml.Numeric] = []
@@ -391,7 +391,7 @@ def _tracked_case(symbol: sym.Tracked, parts: Sequence[sym.Case]) -> sym.Case:
 
 
 def _calculated(operator: str, left: rml.Numeric, right: rml.Numeric) -> rml.Numeric:
-    """The calculation, done at once as far as it can be."""
+    """The calculation, simplified as far as possible."""
     match operator, left, right:
         case _, rml.Number(value=a), rml.Number(value=b):
             return rml.Number({"+": a + b, "-": a - b, "*": a * b, "max": max(a, b), "min": min(a, b)}[operator])
@@ -399,7 +399,7 @@ def _calculated(operator: str, left: rml.Numeric, right: rml.Numeric) -> rml.Num
             return other
         case "*", _, rml.Number(value=0):
             return right
-        case _:  # names are in it
+        case _:  # it contains names
             return rml.Calculation(operator, left, right)
 
 
