@@ -1,6 +1,6 @@
-"""Evidence: claims (`obligation`), attempts at them (`record`), and the file that keeps those (`ledger`: append-only,
-hash-chained).
+"""Evidence: claims (`obligation`), attempts at them (`record`), and the file that keeps the attempts (`ledger`:
+append-only, hash-chained).
 
-`status` is the lattice: what unlike evidence says of one claim; `claims` what follows for claims that rest on claims;
-`currency` which records still count.
+`status` is the lattice: what different kinds of evidence together show for one claim; `claims` derives the status of
+claims that rest on claims; `currency` decides which records still count.
 """

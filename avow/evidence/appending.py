@@ -1,4 +1,4 @@
-"""Files that only grow, written by several processes at once: under a lock, a piece whole or not at all, synced."""
+"""Append-only files written by several processes at once: under a lock, each piece whole or not at all, synced."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from pathlib import Path
 
 @contextmanager
 def locked(path: Path) -> Iterator[int]:
-    """The open file, made where it is not there, for this process alone. Raises OSError."""
+    """The open file, created if it is missing, locked for this process alone. Raises OSError."""
     path.parent.mkdir(parents=True, exist_ok=True)
     file = open_file(str(path), os.O_RDWR | os.O_APPEND | os.O_CREAT)
     try:
@@ -24,7 +24,7 @@ def locked(path: Path) -> Iterator[int]:
 
 
 def open_file(path: str, flags: int) -> int:
-    """Opens only what is a file: a pipe in its place would keep us waiting for ever."""
+    """Opens only a regular file: a pipe in its place would block without limit."""
     file = os.open(path, flags | os.O_NONBLOCK, 0o644)
     if not stat.S_ISREG(os.fstat(file).st_mode):
         os.close(file)
@@ -33,7 +33,7 @@ def open_file(path: str, flags: int) -> int:
 
 
 def append(file: int, data: bytes) -> None:
-    """Add `data` behind all that is there. Raises OSError: then nothing was added."""
+    """Append `data`. Raises OSError: then nothing was added."""
     size = os.fstat(file).st_size
     try:
         done = 0
@@ -41,5 +41,5 @@ def append(file: int, data: bytes) -> None:
             done += os.write(file, data[done:])
         os.fsync(file)
     except BaseException:
-        os.ftruncate(file, size)  # a reader never sees half of it; if even this fails, the next append mends it
+        os.ftruncate(file, size)  # a reader never sees half of it; if even this fails, the next append repairs it
         raise

@@ -1,8 +1,8 @@
-"""The audit: everything that the ledger refers to is digested again, and each discrepancy is named.
+"""The audit: every file that the ledger refers to is hashed again, and each discrepancy is named.
 
-A file is compared with what the *newest* record that left or read it says: an older run's file at the same path has
-been replaced by rights, and its record is history. Whether an answer would come out the same is not asked here (that
-is ``avow verify --fresh``); whether it is the answer that was given, to the question that is said, is.
+A file is compared with the *newest* record that wrote or read it: an older run's file at the same path has been
+replaced legitimately, and its record is history. The audit does not check whether a re-run would give the same answer
+(``avow verify --fresh`` does); it checks that the answer is the recorded one, to the recorded question.
 """
 
 from __future__ import annotations
@@ -22,24 +22,24 @@ from avow.evidence.status import Status, effective
 
 
 class Fault(StrEnum):
-    """The kinds of discrepancy between the ledger and the world."""
+    """The kinds of discrepancy between the ledger and the files."""
 
     LEDGER = "ledger"
     """A line of the ledger was edited, removed, inserted or cannot be read."""
     CHANGED = "changed"
-    """A file that an attempt left behind is not the file that it was."""
+    """A file that an attempt wrote has changed."""
     GONE = "gone"
-    """A file that an attempt left behind is no longer there."""
+    """A file that an attempt wrote no longer exists."""
     MISPLACED = "misplaced"
     """A record points at another obligation, method or system than its key belongs to."""
     IMPOSSIBLE = "impossible"
-    """A record says what its method cannot say."""
+    """A record gives a verdict that its method cannot give."""
     OUTDATED = "outdated"
     """An input has changed since: not tampering, but the evidence is stale."""
     REPLACED = "replaced"
-    """The ledger is not the one that was there before, or was begun anew."""
+    """The ledger is not the one that was there before, or was started again from the first line."""
     REDIRECTED = "redirected"
-    """Where a file of its own should be, a link leads elsewhere."""
+    """A symbolic link replaces one of the ledger's own files."""
     CLOCK = "clock"
     """A record is from the future, or the clock went backwards between two records."""
     SIGNATURE = "signature"
@@ -71,9 +71,9 @@ def audit(
 ) -> tuple[Discrepancy, ...]:
     """Every discrepancy, the ledger's own first. `root` is the workspace; `obligations` maps ids to digests as computed
     now, `keys` (obligation id, method) to the key as of now, `engines` the same to the backend that the plan names, and
-    `strengths` a backend's name to the most that it can show, where the caller knows them. With `now` (with a time
-    zone) records of the future are told. A file matters as long as its record is current, and with `strict` also as
-    long as it is the newest of its method. Raises OSError where the ledger cannot be read."""
+    `strengths` a backend's name to the strongest verdict that it can give, if the caller knows them. With `now` (with a
+    time zone) records of the future are reported. A discrepancy of a file is serious as long as its record is current,
+    and with `strict` also while it is the newest of its method. Raises OSError if the ledger cannot be read."""
     entries = ledger.records()
     found = [Discrepancy(Fault.LEDGER, f"line {d.line}", f"ledger line {d.line} {d.reason}") for d in ledger.damage]
     if ledger.torn:
@@ -124,11 +124,11 @@ def _where(entry: Entry) -> str:
 
 
 _SLACK = timedelta(hours=1)
-"""How far two clocks may differ (a ledger may travel between machines) before it is told."""
+"""How far two clocks may differ (a ledger may travel between machines) before it is reported."""
 
 
 def _clock(entries: tuple[Entry, ...], now: datetime | None) -> Iterable[Discrepancy]:
-    """Ages and expiries are counted by the clock: whoever sets it back makes old evidence young again."""
+    """Ages and expiries are computed from the clock: setting it back would make old evidence count as recent."""
     latest: datetime | None = None
     for entry in entries:
         record = entry.evidence
@@ -151,8 +151,8 @@ def _of(entry: Entry) -> str:
 
 
 def _times(record: Evidence) -> tuple[datetime | None, datetime | None]:
-    """When the attempt started and ended; nothing where its record does not say."""
-    # a score takes its seconds from the record that it is about
+    """When the attempt started and ended; None, None if its record does not say."""
+    # a mutation score takes its seconds from the record that it is about
     seconds = 0.0 if "mutation" in record.details else max(record.seconds, 0.0)
     try:
         started = datetime.fromisoformat(record.started)
@@ -199,7 +199,7 @@ def _files(
     read: dict[str, tuple[str, Entry]] = {}
     newest: dict[tuple[str, str], str] = {}
     alike: dict[tuple[object, ...], list[Entry]] = {}
-    for entry in entries:  # oldest first: the newest record has the last word
+    for entry in entries:  # oldest first: the newest record wins
         record = entry.evidence
         newest[record.obligation, record.method] = record.key
         alike.setdefault(_words(record), []).append(entry)
@@ -207,15 +207,15 @@ def _files(
             left.setdefault(path, []).append(entry)
         for path, mark in record.inputs.items():
             read[path] = (mark, entry)
-    # What counts today was asked of today's files, though a later attempt read them in another state in between.
+    # A record that counts today read today's files, even if a later attempt read them in another state in between.
     for entry in entries:
         if keys and keys.get((entry.evidence.obligation, entry.evidence.method)) == entry.evidence.key:
             read |= {path: (mark, entry) for path, mark in entry.evidence.inputs.items()}
     relied_upon = [newest] if keys is None else [keys, newest] if strict else [keys]
 
     def serious(entry: Entry) -> bool:
-        """Only what a status rests on today can be undermined: files of past attempts may be cleaned away, and of
-        those that say the same, and stand on the same, only the newest counts."""
+        """Only files that a status rests on today are serious: files of past attempts may be deleted, and among records
+        with the same statement and the same deciding details only the newest counts."""
         record = entry.evidence
         if all(known.get((record.obligation, record.method)) != record.key for known in relied_upon):
             return False
@@ -233,12 +233,14 @@ def _files(
 
 
 def _words(record: Evidence) -> tuple[object, ...]:
-    """What a record says, to which question: as a case has it when it leaves out all but the newest that say it."""
+    """A record's statement and the question it answers: a case keeps only the newest of the records that agree in
+    these."""
     return record.obligation, record.method, record.key, effective(record), record.vacuous
 
 
 def _stands_on(record: Evidence) -> Mapping[str, object]:
-    """What decides besides its key whether it counts: of two that differ in it, the earlier may, and the later not."""
+    """The details besides the key that decide whether a record counts: of two records that differ in them, the earlier
+    may count and the later not."""
     return {name: record.details[name] for name in STANDS_ON if name in record.details}
 
 

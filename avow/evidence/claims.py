@@ -1,7 +1,8 @@
-"""Derived claims: what follows when claims rest on claims, with hypotheses, the weakest below them and circles refused.
+"""Derived claims: the status of claims that rest on claims, with hypotheses and the weakest claim below; cycles are
+refused.
 
-A claim stands on its own evidence (`own`), on other claims (`rests_on`, all of them needed), or on both. Nothing is
-kept between calls: deleting an item of evidence and judging again is the same as never having had it.
+A claim rests on its own evidence (`own`), on other claims (`rests_on`, all of them needed), or on both. Nothing is kept
+between calls: deleting an item of evidence and judging again gives the same result as never having had it.
 """
 
 from __future__ import annotations
@@ -16,8 +17,8 @@ from avow.evidence.status import Status, weakest_link
 
 @dataclass(frozen=True, slots=True)
 class Claim:
-    """`own` is the status from the claim's own evidence; None where it has none of its own by nature (a pure
-    combination of others). `prose` marks a claim whose tie to what it rests on is a person's word."""
+    """`own` is the status from the claim's own evidence; None if it has none of its own by nature (a pure combination
+    of others). `prose` marks a claim whose derivation from what it rests on is a person's statement."""
 
     id: str
     own: Status | None = None
@@ -29,22 +30,23 @@ class Claim:
 
 @dataclass(frozen=True, slots=True)
 class Reestablished:
-    """An obligation that the kernel established from its certificate. `solvers`: how many answered each question."""
+    """An obligation that the kernel established from its certificate. `solvers`: the number of solvers that answered
+    each query."""
 
     obligation: str
     solvers: int
     key: str
     scope: str
-    """Under which its certificate stands among those of the run."""
+    """The scope under which its certificate is kept among those of the run."""
 
 
 @dataclass(frozen=True, slots=True)
 class Standing:
-    """Where a claim stands, all things considered.
+    """A claim's status with everything that it rests on.
 
-    `direct`: its own evidence fails; `below`: those claims beneath it that fail in themselves (root causes);
+    `direct`: its own evidence fails; `below`: the claims under it that fail by their own evidence (root causes);
     `weakest`: the claim with the weakest status under it (itself included) and that status; `hypotheses` and `link`:
-    all that it and everything under it rests on, and the least mechanical link among them.
+    those of it and of everything under it, and the least mechanical link among them.
     """
 
     status: Status
@@ -57,7 +59,7 @@ class Standing:
 
 
 def judge(claims: Iterable[Claim]) -> Mapping[str, Standing]:
-    """Every claim's standing. A name under `rests_on` that is no claim counts as a claim that nobody has tried."""
+    """Every claim's standing. A name under `rests_on` that is no claim counts as a claim without evidence."""
     known = {claim.id: claim for claim in claims}
     for claim in tuple(known.values()):
         for name in claim.rests_on:
@@ -114,13 +116,13 @@ def _causes(name: str, standing: Standing) -> tuple[str, ...]:
 
 def _circular(claim: Claim, circle: tuple[str, ...]) -> Standing:
     worst = (claim.id, Status.CIRCULAR)
-    if claim.own is not None and claim.own.rank < Status.CIRCULAR.rank:  # a refutation is told even within a circle
+    if claim.own is not None and claim.own.rank < Status.CIRCULAR.rank:  # a refutation is reported even within a cycle
         return Standing(claim.own, True, (), (claim.id, claim.own), claim.hypotheses, claim.link, circle)
     return Standing(Status.CIRCULAR, True, (), worst, claim.hypotheses, claim.link, circle)
 
 
 def _circle(component: tuple[str, ...], claims: Mapping[str, Claim]) -> tuple[str, ...]:
-    """The circle that makes a strongly connected component one, as a path that ends where it began; else nothing."""
+    """The cycle in a strongly connected component, as a path that ends where it began; empty if there is none."""
     if len(component) == 1 and component[0] not in claims[component[0]].rests_on:
         return ()
     members, start = set(component), min(component)

@@ -1,9 +1,10 @@
-"""Is this ledger the one that was there before? Held against the index of ledgers, and against what reports say of it.
+"""Continuity: whether this ledger is the one that was there before, compared with the index of ledgers and with the
+reports that name its head.
 
-A ledger only grows. So whatever record anybody once named as its newest must be in it now; where it is not, lines were
-cut off the end, or the whole file was deleted, swapped or written anew. Deleting everything to begin anew is anybody's
-right, but it does not go by in silence: with the records a refutation may have gone. Whatever is found stays open until
-a person acknowledges it by name (``avow audit --acknowledge``), and is told for ever after.
+A ledger only grows, so every record once named as its newest must still be in it; otherwise lines were cut off the end,
+or the whole file was deleted, swapped or rewritten. A user may delete everything and start again, but this is reported:
+a refutation may have gone with the records. Each discrepancy stays open until a person acknowledges it by name (``avow
+audit --acknowledge``), and is reported in every later run.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from avow.evidence.ledger import Ledger
 
 
 def continuity(ledger: Ledger, index: Index, anchors: Sequence[Anchor] = ()) -> tuple[Discrepancy, ...]:
-    """What the index and other files say of this ledger that is not so. Raises OSError."""
+    """Statements of the index and of other files about this ledger that do not hold. Raises OSError."""
     system = ledger.path.stem
     entries = ledger.records()
     places = {entry.hash: entry.number for entry in entries}
@@ -53,7 +54,7 @@ def began(index: Index, system: str) -> bool:
 
 
 def _history(ledger: Ledger, statements: Sequence[Statement]) -> Iterable[Discrepancy]:
-    """What was lost, told for ever after; open until a later line acknowledges it."""
+    """The recorded losses, reported in every later run; open until a later line acknowledges them."""
     name, records = ledger.path.name, 0
     until = max((at for at, s in enumerate(statements) if s.event is Event.ACKNOWLEDGED), default=-1)
     if statements and statements[0].event is Event.REACHED:
@@ -81,7 +82,7 @@ def _history(ledger: Ledger, statements: Sequence[Statement]) -> Iterable[Discre
 
 
 def _reached(ledger: Ledger, statements: Sequence[Statement], places: dict[str, int]) -> Iterable[Discrepancy]:
-    """How far it was seen to reach since it last began."""
+    """Whether the ledger still contains every head that was recorded since it last began."""
     starts = (Event.BEGAN, Event.ACKNOWLEDGED)
     since = max((at for at, s in enumerate(statements) if s.event in starts), default=0)
     name = ledger.path.name

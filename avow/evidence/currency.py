@@ -1,7 +1,8 @@
-"""Which records still answer today's question, as far as what their subject was seen to look at can tell.
+"""Currency: which records still answer today's question, judged by the files that the program under test was observed
+to read.
 
-A record's key covers what the plan declares. What the subject looked at besides stands in the record, with digests: if
-one of these is another now, the record is of an earlier state, whatever its key says.
+A record's key covers what the plan declares. The other files that the program under test read are in the record, with
+digests: if one of them has changed, the record is of an earlier state, whatever its key says.
 """
 
 from __future__ import annotations
@@ -22,29 +23,31 @@ from avow.isolation.observed import Observed, Seen, look, marks
 
 
 def stands(record: Evidence, root: Path) -> bool:
-    """Whether all that the unit under test looked at is as it was, and it was kept as far apart as is asked for now. A
-    refutation stands however it was kept: another isolation is no repair."""
+    """Whether everything that the program under test read is unchanged, and it was isolated as strongly as is required
+    now. A refutation counts under any isolation: changing the isolation repairs nothing."""
     return not changed(record, root) and (record.verdict is Verdict.REFUTED or _apart(record))
 
 
 def changed(record: Evidence, root: Path) -> tuple[str, ...]:
-    """The paths that are not as they were; relative ones are under `root`, the workspace."""
+    """The paths that have changed; relative ones are under `root`, the workspace."""
     seen = _rows(record)
     return ("what was observed cannot be read",) if seen is None else tuple(o.path for o in differing(seen, root))
 
 
 def differing(seen: Iterable[Observed], root: Path) -> tuple[Observed, ...]:
-    """Those that are not so on this machine; relative paths are under `root`, the workspace."""
+    """Those that differ on this machine; relative paths are under `root`, the workspace."""
     return tuple(o for o in seen if _now(o.kind, os.path.join(root, o.path)) != o.digest)  # noqa: PTH118
 
 
 def outlived(entry: Entry, refutations: Sequence[Entry]) -> bool:
-    """Whether a refutation by a case came after the entry: what was good before has to try that case, too."""
+    """Whether a refutation by a counterexample came after the entry: an earlier success must be re-run on that case,
+    too."""
     return entry.evidence.verdict.supports and any(r.number > entry.number for r in refutations[-1:])
 
 
 def as_of_now(ledger: Ledger, root: Path) -> tuple[Entry, ...]:
-    """The entries; those that do not stand with a key that is nobody's, so that they count as of an earlier state."""
+    """The entries; those that do not count get a key that matches no question, so that they count as of an earlier
+    state."""
     with ledger.still():
         known = [(entry, refutations(ledger, entry)) for entry in ledger.records()]
     return tuple(
@@ -54,24 +57,25 @@ def as_of_now(ledger: Ledger, root: Path) -> tuple[Entry, ...]:
 
 
 def changed_since(entry: Entry) -> Entry:
-    """The entry of a record whose inputs are others now, or that a later refutation outlived: with a key that is
-    nobody's."""
+    """The entry of a record whose inputs have changed, or that a later refutation supersedes, with a key that matches
+    no question."""
     return replace(entry, evidence=replace(entry.evidence, key=sha256(f"changed since: {entry.hash}")))
 
 
 def not_established(entry: Entry) -> Entry:
-    """The entry of a proof that the kernel does not establish any more: with a key that is nobody's."""
+    """The entry of a proof that the kernel no longer establishes, with a key that matches no question."""
     return replace(entry, evidence=replace(entry.evidence, key=sha256(f"not established: {entry.hash}")))
 
 
 def refutations(ledger: Ledger, entry: Entry) -> tuple[Entry, ...]:
-    """By a case, of the same claim and by the same backend."""
+    """The refutations by a counterexample, of the same claim and by the same backend."""
     record = entry.evidence
     return ledger.refutations(record.obligation, record.obligation_digest, record.backend)
 
 
 def looked_at(entries: Iterable[Entry], root: Path) -> tuple[Observed, ...]:
-    """All that subjects looked at, each once, with its whole path; relative ones are under `root`, the workspace."""
+    """Everything that programs under test read, each once, with its whole path; relative ones are under `root`, the
+    workspace."""
     found: dict[tuple[str, Seen], Observed] = {}
     for entry in entries:
         found |= {(o.path, o.kind): o for o in _rows(entry.evidence) or () if o.kind is not Seen.OUTSIDE}
@@ -79,7 +83,8 @@ def looked_at(entries: Iterable[Entry], root: Path) -> tuple[Observed, ...]:
 
 
 def _rows(record: Evidence) -> tuple[Observed, ...] | None:
-    """What its subject was seen to look at; None where that cannot be read: a ledger may be forged."""
+    """The files that its program under test was observed to read; None if the details cannot be read: a ledger may be
+    forged."""
     if OBSERVED not in record.details:
         return ()
     try:
@@ -94,7 +99,7 @@ def _apart(record: Evidence) -> bool:
 
 
 def _now(kind: Seen, path: str) -> str:
-    """As `look`; what is as it was a moment ago is not read again."""
+    """As `look`, without reading again what has not changed since the last look."""
     mark = marks(Observed(kind, path))
     return look(kind, path) if mark is None else _digest(kind, path, mark)
 

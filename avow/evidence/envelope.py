@@ -1,7 +1,7 @@
 """A statement in a DSSE envelope (https://github.com/secure-systems-lab/dsse), signed with ed25519 or by name only.
 
-Without a key a statement says whose name somebody wrote there, and that it is still the text that was written; with one
-it says that the holder of the key vouches for it.
+Without a key, an envelope shows the name that was written in it, and nothing more; with a key, it shows that the key's
+holder signed the text.
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ PAYLOAD = "application/vnd.in-toto+json"
 
 @dataclass(frozen=True, slots=True)
 class Opened:
-    """A statement that verifies, and how, in words."""
+    """A statement that verifies, and a description of how it was verified."""
 
     statement: dict[str, Any]
     checked: str
     key: str = ""
-    """The public key that signed it, in hexadecimal; empty: none did."""
+    """The public key that signed it, in hexadecimal; empty if none did."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,7 +36,7 @@ class _Signature(Foreign):
 
 @dataclass(frozen=True, slots=True)
 class _Envelope(Foreign):
-    """As DSSE has it."""
+    """The envelope in DSSE's format."""
 
     payload: bytes
     payloadType: str  # noqa: N815 - its own name
@@ -62,8 +62,9 @@ def seal_lines(statements: str, private: Path) -> str:
 
 
 def unseal_lines(text: str, trusted: Sequence[Path] = ()) -> str:
-    """The statements in envelopes, one a line, as `seal_lines` was given them; a line that is no envelope, or whose
-    signature is not true, as what is wrong with it. Raises Rejected for a trusted key that cannot be read."""
+    """The statements in envelopes, one a line, as `seal_lines` received them; for a line that is no envelope, or whose
+    signature is not valid, a line that says what is wrong with it. Raises Rejected for a trusted key that cannot be
+    read."""
     found = (unseal(line, trusted) for line in text.splitlines())
     return "".join(
         f"{one if isinstance(one, str) else json.dumps(one.statement, ensure_ascii=True, sort_keys=True)}\n"
@@ -72,9 +73,9 @@ def unseal_lines(text: str, trusted: Sequence[Path] = ()) -> str:
 
 
 def unseal(text: str, trusted: Sequence[Path] = ()) -> Opened | str:
-    """The statement, or why it does not verify. With `trusted` public keys one of them must have signed it; without,
-    an envelope without a signature is taken at its word, and one with a signature must bear it truly.
-    Raises Rejected for a trusted key that cannot be read."""
+    """The statement, or why it does not verify. With `trusted` public keys one of them must have signed it; otherwise
+    an envelope without a signature is accepted, and a signature must be valid. Raises Rejected for a trusted key that
+    cannot be read."""
     try:
         body = from_text(_Envelope, text)
         payload, signatures = body.payload, [(bytes.fromhex(s.keyid), s.sig) for s in body.signatures]

@@ -1,18 +1,19 @@
-"""The index of ledgers: which there are, and how far each was seen to reach.
+"""The index of ledgers: which ledgers there are, and the newest record seen in each.
 
-A ledger's own chain cannot tell that the whole file is gone, or that it was written anew from the first line. So beside
-the ledgers stands ``index``, a file of chained lines of its own:
+A ledger's own chain cannot show that the whole file is gone, or that it was rewritten from the first line. So the
+folder of the ledgers also has ``index``, a file of chained lines of its own:
 
     {"event": "reached", "hash": "…", "head": "…", "n": 1, "prev": "…", "records": 36, "system": "rover", "time": "…"}
 
-- ``began``: the first record of a ledger is about to be written. A second one says that the file was deleted meanwhile.
-- ``reached``: a report was made of so many records, up to that one. They must be in the ledger for ever after.
-- ``lost``: a report stood here that was made of another ledger than the one that began.
-- ``acknowledged``: a person has seen what the lines before say is lost or damaged, and why; with name and reason. What
-  comes to light later is another matter.
+- ``began``: the first record of a ledger is about to be written. A second one means that the file was deleted in
+  between.
+- ``reached``: a report was made of so many records, up to that one. They must stay in the ledger.
+- ``lost``: there was a report made of another ledger than the one that began.
+- ``acknowledged``: a person has accepted the losses and damage that the lines before record, with name and reason.
+  Later findings are not covered.
 
 Reports and attestations name the head as well (`stated_heads`), and may be kept elsewhere. Nothing of this is secret:
-somebody who writes ledger, index *and* reports anew is only found out by a signature or by a copy kept elsewhere.
+if ledger, index *and* reports are all rewritten, only a signature or a copy kept elsewhere shows it.
 """
 
 from __future__ import annotations
@@ -32,7 +33,7 @@ from avow.base.records import dataclass
 from avow.evidence.appending import append, locked
 
 GENESIS = "0" * 64
-"""What the first record of a chain follows."""
+"""The hash before the first record of a chain."""
 
 
 class Event(StrEnum):
@@ -44,7 +45,7 @@ class Event(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Statement:
-    """A line of the index. `records` is 0 where only the head is known."""
+    """A line of the index. `records` is 0 if only the head is known."""
 
     event: Event
     system: str
@@ -52,14 +53,14 @@ class Statement:
     head: str
     time: str
     note: str = field(default="", metadata=LATER)
-    """Who acknowledged, and why."""
+    """The person who acknowledged, and the reason."""
     state: str = field(default="", metadata=LATER)
     """Digest of the damage that was acknowledged."""
 
 
 @dataclass(frozen=True, slots=True)
 class Line(Statement):
-    """As it is written: its number, the hash of the line before it, and its own, of all the rest."""
+    """The line as written: its number, the hash of the line before it, and its own hash, over all other fields."""
 
     n: int = field(kw_only=True)
     prev: str = field(kw_only=True)
@@ -68,7 +69,7 @@ class Line(Statement):
 
 @dataclass(frozen=True, slots=True)
 class Head:
-    """What ``<ledger>.head`` holds: the newest record's hash, and how many records there are."""
+    """The content of ``<ledger>.head``: the newest record's hash, and the number of records."""
 
     hash: str
     records: int
@@ -76,7 +77,8 @@ class Head:
 
 @dataclass(frozen=True, slots=True)
 class Index:
-    """What can be read of the index, and in words what cannot. `marks` are the lines' hashes, for signatures."""
+    """The readable lines of the index, and a description of the damage. `marks` are the lines' hashes, for
+    signatures."""
 
     statements: tuple[Statement, ...] = ()
     marks: tuple[str, ...] = ()
@@ -97,7 +99,7 @@ def index_path(ledgers: Path) -> Path:
 
 
 def read_index(path: Path) -> Index:
-    """Raises OSError where there is a file that cannot be read."""
+    """Raises OSError if the file exists and cannot be read."""
     try:
         data = read_regular(path)
     except FileNotFoundError:
@@ -117,7 +119,7 @@ def read_index(path: Path) -> Index:
         previous = said.hash
         found.append(said)
         marks.append(said.hash)
-    if torn and not torn.startswith(b'{"event":'):  # else a run was killed while writing it: the next one mends it
+    if torn and not torn.startswith(b'{"event":'):  # else a run was killed while writing it: the next one repairs it
         damage.append("there is something behind the last line of the index of ledgers")
     return Index(tuple(found), tuple(marks), tuple(damage), True)
 
@@ -130,7 +132,7 @@ def note(path: Path, event: Event, system: str, records: int = 0, head: str = GE
     with locked(path) as file:
         data = read_regular(path)
         whole = data[: data.rfind(b"\n") + 1]
-        os.ftruncate(file, len(whole))  # what a killed run left half written
+        os.ftruncate(file, len(whole))  # removes what a killed run left half written
         lines = whole.splitlines()
         last = _read(lines[-1]) if lines else None
         now = datetime.now(UTC).isoformat(timespec="seconds")
@@ -144,13 +146,13 @@ def _is_newest(index: Index, event: Event, system: str, records: int, head: str)
 
 
 def _written(said: Line) -> bytes:
-    """With its hash."""
+    """The line with its hash."""
     mark = sha256(canonical(to_json(replace(said, hash=""))))
     return canonical(to_json(replace(said, hash=mark))).encode()
 
 
 def _read(line: bytes) -> Line | None:
-    """None for a line that is not as it was written."""
+    """None for a line that differs from what was written."""
     try:
         said = from_text(Line, line)
     except Unreadable:
@@ -171,8 +173,8 @@ class Anchor:
 
 
 def stated_heads(path: Path, where: str) -> tuple[Anchor, ...]:
-    """What a ``report.json``, an ``attestation.jsonl`` or a folder with reports in it says of ledgers' heads; nothing
-    where it says nothing that can be read. Raises OSError for a file that cannot be read."""
+    """The ledgers' heads that a ``report.json``, an ``attestation.jsonl`` or a folder with reports in it names; empty
+    if it names none that can be read. Raises OSError for a file that cannot be read."""
     if path.is_dir():
         files = [*path.glob("report.json"), *path.glob("*/report.json"), *path.glob("attestation.jsonl")]
         return tuple(a for file in sorted(files) for a in stated_heads(file, where or file.as_posix()))
@@ -187,7 +189,7 @@ def stated_heads(path: Path, where: str) -> tuple[Anchor, ...]:
 
 
 def _short(data: bytes) -> bytes:
-    """Of a report as Avow writes it (an item a line, and no raw line end in any text) the two items that matter; else
+    """The two items that matter of a report as Avow writes it (an item a line, and no raw line end in any text); else
     all of it. A report has megabytes."""
     lines = []
     for name in (b'\n "ledger_head": "', b'\n "system": "'):
@@ -201,7 +203,7 @@ def _short(data: bytes) -> bytes:
 
 def _heads(data: object) -> Iterable[tuple[str, str]]:
     match data:
-        case {"payload": str(payload), "signatures": [*_]}:  # an envelope: what it says, whoever signed it
+        case {"payload": str(payload), "signatures": [*_]}:  # an envelope: its statement, whoever signed it
             yield from _heads(json.loads(base64.b64decode(payload)))
         case {"ledger_head": str(head), "system": str(system)}:
             yield system, head

@@ -1,17 +1,18 @@
-"""The evidence ledger: one JSON-lines file a system, append-only, hash-chained, safe against kills and full disks.
+"""The evidence ledger: one JSON-lines file a system, append-only, hash-chained, safe if a run is killed or the disk is
+full.
 
     {"evidence": {…}, "hash": "…", "n": 7, "prev": "…"}        hash = SHA-256 of the line without its hash
 
 - A record is written whole under a lock and synced before `append` returns. A killed run leaves at most one torn last
-  line; the next append moves those bytes to ``<file>.torn`` and goes on, and says so in `Ledger.repaired`.
+  line; the next append moves those bytes to ``<file>.torn``, goes on, and reports it in `Ledger.repaired`.
 - A line in the middle that cannot be read, does not match its hash or does not follow its predecessor is *damage*: it
-  is never used as evidence, and it is never passed over in silence (`Ledger.damage`, `avow audit`, a gate).
+  is never used as evidence, and always reported (`Ledger.damage`, `avow audit`, a gate).
 - ``<file>.head`` names the newest record, so that cutting whole lines off the end is noticed too; the ``index`` of the
   folder names the ledgers themselves (`avow.evidence.heads`).
-- A line has one spelling, byte for byte. Another encoding, a space or a key that stands twice is damage.
+- A line has one spelling, byte for byte. Another encoding, an extra space or a repeated key is damage.
 - The same evidence appended twice is kept once.
-- ``<file>.read`` is a note of this user's Avow (`avow.base.notes`): so many first bytes, with that digest, were found
-  without damage. A run does not hold these lines against each other again; `audit` and a fresh run do.
+- ``<file>.read`` is a note of this user's Avow (`avow.base.notes`): the first so many bytes, with that digest, were
+  found without damage. A run does not check these lines against each other again; `audit` and a fresh run do.
 """
 
 from __future__ import annotations
@@ -61,7 +62,7 @@ class Line:
 
 @dataclass(frozen=True, slots=True)
 class Damage:
-    """A line of the ledger that must not be believed. `line` counts from 1."""
+    """A line of the ledger that must not be used. `line` counts from 1."""
 
     line: int
     reason: str
@@ -69,7 +70,7 @@ class Damage:
 
 @dataclass(frozen=True, slots=True)
 class _Known:
-    """So many of a ledger's bytes, with this digest, were found without damage."""
+    """The number of a ledger's bytes that were found without damage, with their digest."""
 
     bytes: int
     sha256: str
@@ -79,11 +80,11 @@ class Ledger:
     """One system's ledger file. Safe to use from several threads and several processes at once."""
 
     def __init__(self, path: Path, *, remembers: bool = False) -> None:
-        """`remembers`: what a note says was read without damage is not checked again."""
+        """`remembers`: lines that a note records as read without damage are not checked again."""
         self.path = path
         self._remembers = remembers
         self.repaired: tuple[str, ...] = ()
-        """What was done about torn lines, in sentences."""
+        """The repairs of torn lines, in sentences."""
         self._lock = threading.RLock()
         self._held = 0
         self._forget()
@@ -91,28 +92,28 @@ class Ledger:
     # -- reading ------------------------------------------------------------------------------------------------
 
     def records(self) -> tuple[Entry, ...]:
-        """Every record that can be believed, oldest first. Raises OSError where the file cannot be read."""
+        """Every record without damage, oldest first. Raises OSError if the file cannot be read."""
         with self._lock:
             self._refresh()
             return tuple(self._entries)
 
     @property
     def damage(self) -> tuple[Damage, ...]:
-        """Every line that cannot be believed, and a missing end."""
+        """Every damaged line, and a missing end."""
         with self._lock:
             self._refresh()
             return (*self._damage, *self._garbage(), *self._cut_off())
 
     @property
     def torn(self) -> bool:
-        """Whether the last line is half written: a run was killed, and the next one will put it aside."""
+        """Whether the last line is half written: a run was killed, and the next one will move the line aside."""
         with self._lock:
             self._refresh()
             return bool(self._tail) and not self._garbage()
 
     @property
     def head(self) -> str:
-        """The hash of the newest record; `GENESIS` where there is none."""
+        """The hash of the newest record; `GENESIS` if there is none."""
         entries = self.records()
         return entries[-1].hash if entries else GENESIS
 
@@ -122,13 +123,14 @@ class Ledger:
         return found[-1] if found else None
 
     def current(self, obligation: str, key: str) -> tuple[Entry, ...]:
-        """All attempts at an obligation that answer the question as `key` puts it now, oldest first."""
+        """All attempts at an obligation that have the current `key`, oldest first."""
         with self._lock:
             self._refresh()
             return tuple(self._by_key.get((obligation, key), ()))
 
     def refutations(self, obligation: str, digest: str, backend: str) -> tuple[Entry, ...]:
-        """What the backend once refuted by a case, of the obligation of that name or that meaning, oldest first."""
+        """The backend's refutations by a counterexample, of the obligation of that name or that meaning, oldest
+        first."""
         with self._lock:
             self._refresh()
             if not self._refuted:
@@ -137,7 +139,7 @@ class Ledger:
             return tuple({e.number: e for e in sorted(found, key=lambda e: e.number)}.values())
 
     def check(self) -> None:
-        """Hold every line against the one before it, whatever a note says of them."""
+        """Check every line against the one before it, whatever a note records."""
         with self._lock:
             if self._remembers:
                 self._remembers = False
@@ -145,8 +147,8 @@ class Ledger:
 
     @contextlib.contextmanager
     def still(self) -> Iterator[None]:
-        """Many questions about the ledger as it stands now: within the block nothing is read, and nothing written. Not
-        to be left open for long: others wait."""
+        """Holds the ledger fixed for many queries: within the block nothing is read or written. Keep the block short:
+        other threads wait."""
         with self._lock:
             self._refresh()
             self._held += 1
@@ -189,12 +191,12 @@ class Ledger:
                 append(file, "".join(lines).encode())
                 self._refresh()
                 self._remember()
-            if lines and not cut:  # a new head would make the cut unseen; a ledger deleted as a whole begins anew
+            if lines and not cut:  # a new head would hide the cut; a ledger deleted as a whole begins again
                 self._write_head(Head(previous, number))
             return tuple(result)
 
     def accept_end(self) -> None:
-        """The newest record that is there is the newest that there has to be. Raises OSError."""
+        """Accept the newest record that is there as the end: no later one is missing. Raises OSError."""
         with self._lock, locked(self.path) as file:
             assert not self._held, "nothing is written while the ledger is to stand still"
             self._mend(file)
@@ -230,13 +232,14 @@ class Ledger:
                 write_note(self._note, _Known(self._offset, self._digest.hexdigest()))
 
     def _remembered(self, data: bytes) -> int:
-        """How many of a ledger's bytes were read before and found without damage."""
+        """The number of a ledger's bytes that were read before and found without damage."""
         said = read_note(_Known, self._note) if self._remembers and not self._offset else None
         known = said is not None and said.bytes <= len(data) and sha256(data[: said.bytes]) == said.sha256
         return said.bytes if said is not None and known else 0
 
     def _mend(self, file: int) -> None:
-        """Put a torn last line (a run was killed while writing it) aside, so that the chain goes on behind it."""
+        """Move a torn last line (a run was killed while writing it) aside, so that the chain continues after the line
+        before it."""
         size = os.fstat(file).st_size
         if size == 0 or os.pread(file, 1, size - 1) == b"\n":
             return
@@ -280,7 +283,7 @@ class Ledger:
             self._take(line)
 
     def _believe(self, lines: Sequence[bytes]) -> None:
-        """The first lines, taken before."""
+        """Take the first lines, which were checked before."""
         for line, data in zip(lines, json.loads(b"[%b]" % b",".join(lines)), strict=True):
             self._keep(line[len(_BEFORE) : line.rindex(_BEHIND)], _entry(data))
         self._lines, self._stated_head = len(lines), self._entries[-1].hash
@@ -297,7 +300,7 @@ class Ledger:
             return
         follows = entry.previous == self._stated_head and entry.number == number
         self._stated_head = entry.hash
-        if not follows:  # told, but the record itself may still be whole: dropping it could hide a refutation
+        if not follows:  # reported, but the record itself may still be whole: dropping it could hide a refutation
             reason = "does not follow the record before it: a record was removed, inserted, moved or made unreadable"
             self._damage.append(Damage(number + 1, reason))
         identity = evidence.encode()
@@ -305,7 +308,7 @@ class Ledger:
         if mark != entry.hash:
             self._damage.append(Damage(number + 1, f"was changed after it was written ({entry.evidence.obligation})"))
             return
-        if spelled.encode() != line:  # what is in it is what was written, but by another hand
+        if spelled.encode() != line:  # the content is as it was written, but another program wrote it
             self._damage.append(Damage(number + 1, "is not spelled as it was written (encoding, spaces, doubled keys)"))
         if follows and identity in self._known:
             self._damage.append(Damage(number + 1, f"repeats record {self._known[identity].number + 1}"))
@@ -321,7 +324,7 @@ class Ledger:
                 self._refuted.setdefault((name, record.backend), []).append(entry)
 
     def _garbage(self) -> tuple[Damage, ...]:
-        """What stands behind the last line and is not the beginning of one."""
+        """Bytes after the last line that are not the beginning of a line."""
         start = b'{"evidence":{'
         if self._tail.startswith(start) or start.startswith(self._tail):
             return ()
@@ -346,7 +349,7 @@ class Ledger:
 
 @contextlib.contextmanager
 def readable(path: Path) -> Iterator[None]:
-    """Raises Rejected (``LEDGER001``) for the OSError of a ledger, or their index, that is there and cannot be read."""
+    """Raises Rejected (``LEDGER001``) for an OSError: a ledger, or the index of ledgers, exists and cannot be read."""
     try:
         yield
     except OSError as error:
@@ -355,17 +358,17 @@ def readable(path: Path) -> Iterator[None]:
 
 @functools.cache
 def ledger_of(path: Path) -> Ledger:
-    """One reader for each file and process: it reads what was added since, not all again."""
+    """One reader for each file and process: it reads only what was added since."""
     return Ledger(path, remembers=True)
 
 
 def encode(evidence: Evidence) -> dict[str, Any]:
     """A record as plain JSON data."""
-    return {**to_json(evidence), "seconds": plain(float(evidence.seconds))}  # one spelling, whichever number was given
+    return {**to_json(evidence), "seconds": plain(float(evidence.seconds))}  # one spelling, whatever the number's type
 
 
 _BEFORE, _BEHIND = b'{"evidence":', b',"hash":"'
-"""What stands in a line before its record, and last in it behind it."""
+"""The text of a line before its record, and the last text after it."""
 
 
 def _spell(evidence: str, number: int, previous: str) -> tuple[str, str]:

@@ -21,30 +21,30 @@ class Kind(StrEnum):
     GUARANTEE = "guarantee"
     REQUIREMENT = "requirement"
     PROGRAM = "program"
-    """Of a node's program, beside its contract: see `ProgramClaim`."""
+    """Claims about a node's program, besides its contract: see `ProgramClaim`."""
 
 
 class ProgramClaim(StrEnum):
-    """What is claimed of the program that a node is, besides that it meets the contract; the claim's name."""
+    """The claims about a node's program, besides that it meets the contract; the claim's name."""
 
     FAULTLESS = "runs-without-fault"
-    """No run within its assumptions ends by a signal or an exception, or does what its language gives no meaning to."""
+    """No run within its assumptions ends by a signal or an exception, or has undefined behaviour."""
     LINKED = "agrees-with-model"
-    """The model that was verified in its place answers as it does."""
+    """The model that was verified in its place gives the same outputs."""
 
 
 _SAYS_NOTHING = show_term(TRUE)
 
 SYSTEM_LEVEL = "system"
-"""Stands in an id where an obligation belongs to no single node."""
+"""The node part of an id if an obligation belongs to no single node."""
 
 
-@dataclasses.dataclass(frozen=True)  # without slots: it keeps its name, which is asked for very often
+@dataclasses.dataclass(frozen=True)  # without slots: it caches its id, which is read very often
 class Obligation:
     """One claim. Pure data.
 
-    `digest` is a SHA-256 of its *meaning* (typed, normalised formulas, the sorts that they use, the scenario where one
-    is used): comments, layout and bound names do not change it, a threshold does.
+    `digest` is a SHA-256 of its *meaning* (typed, normalised formulas, the sorts that they use, the scenario, if one is
+    used): comments, layout and bound names do not change it, a threshold does.
     """
 
     system: str
@@ -52,19 +52,19 @@ class Obligation:
     kind: Kind
     name: str
     claim: str
-    """A sentence for people."""
+    """A sentence for readers."""
     formula: str
-    """The formula as people write it (Unicode), or empty."""
+    """The formula in Unicode notation, or empty."""
     digest: str
     clauses: tuple[str, ...] = ()
     """``node.clause`` names that the claim is about."""
     span: Span | None = field(default=None, compare=False, repr=False)
     advisory: bool = False
-    """Worth knowing, but nothing is unsound if the claim is false: no gate asks for it."""
+    """Useful to know, but nothing is unsound if the claim is false: no gate requires it."""
 
     @functools.cached_property
     def id(self) -> str:
-        """``system/node/kind/name``: for people, stable under edits of the formula."""
+        """``system/node/kind/name``: for readers, stable under edits of the formula."""
         return f"{self.system}/{self.node}/{self.kind}/{self.name}"
 
     @property
@@ -73,12 +73,12 @@ class Obligation:
         return self.kind is Kind.GUARANTEE and self.name == TO_WRITE and self.formula == _SAYS_NOTHING
 
     def at(self, span: Span | None) -> Obligation:
-        """The same claim, with another place in a text."""
+        """The same claim, with another position in a text."""
         other = copy.copy(self)  # there are thousands
         object.__setattr__(other, "span", span)
         return other
 
     @property
     def local_id(self) -> str:
-        """The id without the system: what plans name."""
+        """The id without the system, as plans name it."""
         return f"{self.node}/{self.kind}/{self.name}"

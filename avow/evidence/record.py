@@ -11,30 +11,30 @@ from avow.base.records import dataclass
 from avow.base.verdict import Counterexample, Hypothesis, Link, Object, Verdict
 
 RETRY = "retry"
-"""Among the details of an answer that the next run must not be content with: what asked for it was cut short."""
+"""Among the details of an answer that the next run must not reuse: the run that requested it was cut short."""
 
 OUTPUT_FOR_EVERY_INPUT = "output for every input"
-"""Among the details of a proof: true where the same program is also proved to have an output for every allowed input,
-so that all its proofs together show that such a program exists."""
+"""Among the details of a proof: true if the same program is also proved to have an output for every allowed input, so
+that all its proofs together show that such a program exists."""
 
 REMARKS = "remarks"
-"""Among the details: what the method's own check remarks of plan and files, a list of ``{code, place, message}``.
-Nothing fails for it, but who reads the answer should know."""
+"""Among the details: the remarks of the method's own check on plan and files, a list of ``{code, place, message}``. No
+run fails for them; readers of the answer should see them."""
 
 SIGNED_BY = "signed_by"
 """Among a review's details: the public key, in hexadecimal, that signed its record."""
 
 OBSERVED = "observed"
-"""Among a record's details: what the subject was seen to look at, as (kind, path, digest)."""
+"""Among a record's details: what the program under test was observed to read, as (kind, path, digest)."""
 
 ISOLATION = "isolation"
-"""Among a record's details: how far the subject was kept from its judge."""
+"""Among a record's details: how far the program under test was isolated from its oracle."""
 
 RATE = "rate"
 """Among the details of a sample: its strata (`avow.kernel.rates.Stratum`), from which rates are composed."""
 
 COMPOSES = "composes"
-"""Among the details of a requirement's proof: of what samples its failure rate may be composed
+"""Among the details of a requirement's proof: the samples that its failure rate may be composed of
 (`avow.calculus.trials`)."""
 
 AGREES = "agrees"
@@ -42,18 +42,18 @@ AGREES = "agrees"
 compared."""
 
 STANDS_ON = (OBSERVED, ISOLATION, RETRY, "certificate", "mutation", "valid_until")
-"""The details by which one of two records that say the same may count and the other not."""
+"""The details by which one of two records with the same statement may count and the other not."""
 
 CASE = "case"
-"""Among the details of a refutation: its inputs as data of the backend's own, to be tried first on every later run."""
+"""Among the details of a refutation: its inputs in the backend's own format, to be tried first on every later run."""
 
 
 @dataclass(frozen=True, slots=True)
 class Evidence:
     """A line of the ledger, without its chain hash.
 
-    `key` is what the answer depends on, digested (obligation, options, input files, backend and tool versions): a
-    record is current while the key computed afresh is the same. Paths are relative to the workspace.
+    `key` is the digest of everything that the answer depends on (obligation, options, input files, backend and tool
+    versions): a record is current while its key equals the one computed now. Paths are relative to the workspace.
     """
 
     obligation: str
@@ -74,9 +74,9 @@ class Evidence:
     """ISO 8601, UTC."""
     seconds: float
     inputs: Mapping[str, str] = field(default_factory=dict)
-    """Path → SHA-256 of every file that the answer rests on."""
+    """Path → SHA-256 of every file that the answer depends on."""
     outputs: Mapping[str, str] = field(default_factory=dict)
-    """Path → SHA-256 of every file that the attempt left: artifacts and logs."""
+    """Path → SHA-256 of every file that the attempt wrote: artifacts and logs."""
     counterexample: Counterexample | None = None
     hypotheses: tuple[str, ...] = ()
     bound: Mapping[str, Any] = field(default_factory=dict)
@@ -85,15 +85,15 @@ class Evidence:
     run: str = ""
     """Id of the run that produced it."""
     rests_on: tuple[Hypothesis, ...] = field(default=(), metadata=LATER)
-    """What the answer rests on: claims of the case, and assumptions that a person has to accept."""
+    """What the answer rests on: claims of the case, and assumptions that a person must accept."""
     of: Object = field(default=Object.MODEL, metadata=LATER)
-    """What was verified."""
+    """The kind of object that was verified."""
     numbers: str = field(default="exact", metadata=LATER)
-    """What a REAL was in it, as plans have it under `numbers`."""
+    """The semantics of REAL in it, as plans name it under `numbers`."""
 
     @property
     def tool_told(self) -> str:
-        """The tool and its version, the name once. A person's reason is no tool's."""
+        """The tool and its version, the name once. A justification by a person has no tool."""
         if self.verdict is Verdict.JUSTIFIED:
             return "a person"
         named = self.tool_version.casefold().startswith(self.tool.casefold())

@@ -1,8 +1,8 @@
-"""Optional signatures (ed25519, offline, extra ``avow[signing]``): who vouches for a ledger up to its newest record.
+"""Optional signatures (ed25519, offline, extra ``avow[signing]``) of a ledger up to its newest record.
 
-The signature is over the head's hash and the number of records; through the hash chain that covers every record. It
-stands beside the ledger as ``<ledger>.sig``, and stays valid for the records that it covers when others follow. The
-index of ledgers is signed in the same way: so a ledger that is gone as a whole, signature and all, is missed.
+The signature is over the head's hash and the number of records; through the hash chain it covers every record. It is
+kept beside the ledger as ``<ledger>.sig``, and stays valid for the records that it covers when others follow. The index
+of ledgers is signed in the same way, so that the loss of a whole ledger, with its signature, is noticed.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ _CONTEXT = "avow ledger head 1"
 
 
 def signature_path(signed: Path) -> Path:
-    """Where the signature of a ledger or of a review's record lies."""
+    """The path of the signature of a ledger or of a review's record."""
     return signed.with_name(signed.name + ".sig")
 
 
@@ -51,7 +51,7 @@ def new_key_pair(private: Path) -> Path:
 
 @dataclass(frozen=True, slots=True)
 class Signed:
-    """A chain that is signed: what it is called, and the hashes of its lines, oldest first."""
+    """A chain that is signed: its name, and the hashes of its lines, oldest first."""
 
     name: str
     marks: tuple[str, ...]
@@ -59,8 +59,8 @@ class Signed:
 
 @dataclass(frozen=True, slots=True)
 class Signature:
-    """What ``<ledger>.sig`` holds: the hash of the newest line covered, and how many are; key and signature
-    in hexadecimal."""
+    """The content of ``<ledger>.sig``: the hash of the newest line covered, and the number of lines covered; key and
+    signature in hexadecimal."""
 
     hash: str
     public_key: str
@@ -69,8 +69,8 @@ class Signature:
 
 
 def sign(path: Path, chain: Signed, private: Path) -> Path:
-    """Sign the newest line, and with it all before; the signature is written to `path`. Raises Rejected: nothing to
-    sign, no such key."""
+    """Sign the newest line, and with it all before; the signature is written to `path`. Raises Rejected if there is
+    nothing to sign, or no such key."""
     key = private_key(private)
     if not chain.marks:
         raise Rejected(Diagnostic("SIGN002", f"{chain.name} has no records: it is not signed"))
@@ -84,8 +84,9 @@ def sign(path: Path, chain: Signed, private: Path) -> Path:
 def verify_signature(path: Path, chain: Signed, public: Path | None) -> tuple[str | None, int]:
     """What is wrong with a signature (None if nothing is), and how many of the chain's lines it covers.
 
-    Without a key of one's own, the signature's own key is believed: then it only shows that nothing was changed since
-    that key was used. Raises Rejected."""
+    Without `public`, the signature's own key is used: it then only shows that nothing was changed since that key was
+    used. Raises Rejected.
+    """
     _needs_cryptography()
     from cryptography.exceptions import InvalidSignature
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PublicKey
@@ -111,7 +112,7 @@ def _message(system: str, head: str, count: int) -> bytes:
 
 
 def private_key(path: Path) -> Ed25519PrivateKey:
-    """Raises Rejected where the file holds none."""
+    """Raises Rejected if the file holds no ed25519 private key."""
     _needs_cryptography()
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
     from cryptography.hazmat.primitives.serialization import load_pem_private_key
@@ -126,7 +127,7 @@ def private_key(path: Path) -> Ed25519PrivateKey:
 
 
 def public_key(path: Path) -> Ed25519PublicKey:
-    """Raises Rejected where the file holds none."""
+    """Raises Rejected if the file holds no ed25519 public key."""
     _needs_cryptography()
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PublicKey
     from cryptography.hazmat.primitives.serialization import load_pem_public_key

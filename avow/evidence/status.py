@@ -1,8 +1,8 @@
-"""The lattice: what a set of unlike evidence says of one claim.
+"""The lattice: the status that different kinds of evidence together give one claim.
 
-A claim's evidence is weighed item by item into a `Weight`; weights are joined by taking the greatest of each part, so
-joining is associative, commutative and idempotent: order and duplication cannot matter, and nothing that is joined can
-take a refutation away. `Weight.status` reads the one word off it. Everything here is pure and small on purpose.
+Each item of evidence has a `Weight`; weights are joined by taking the greatest of each part, so joining is associative,
+commutative and idempotent: order and duplication do not matter, and no join can remove a refutation. `Weight.status`
+computes the status from it. Everything here is pure and small on purpose.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from avow.evidence.record import Evidence
 
 
 class Status(StrEnum):
-    """Where a claim stands. A verdict has the status of its name; the other words are only ever computed."""
+    """The status of a claim. A verdict has the status of its name; the other statuses are only ever computed."""
 
     PROVED = "proved"
     CHECKED = "checked"
@@ -26,22 +26,22 @@ class Status(StrEnum):
     REVIEWED = "reviewed"
     JUSTIFIED = "justified"
     ARGUED = "argued"
-    """A claim in prose: a person says that what stands below it, which holds, amounts to it."""
+    """A claim in prose: a person states that the claims below it, which hold, amount to it."""
     PARTIAL = "partial"
-    """Proved of every run that ends; that the runs end is not shown, and nobody has taken it upon himself."""
+    """Proved of every run that ends; termination is not shown, and no person has accepted it."""
     UNWRITTEN = "unwritten"
-    """A draft's placeholder: what the node promises is still to be written. Whatever else is open is told first."""
+    """A draft's placeholder: the node's guarantee is still to be written. Every other open status is reported first."""
     VACUOUS = "vacuous"
     """Evidence whose trigger was never met: it supports nothing."""
     UNKNOWN = "unknown"
     NOT_RUN = "not-run"
     ERROR = "error"
     STALE = "stale"
-    """There was evidence, but what it was about has changed since."""
+    """There was evidence, but its claim, inputs or method have changed since."""
     MISSING = "missing"
-    """Nobody has tried."""
+    """No attempt was made."""
     UNSUPPORTED = "unsupported"
-    """Nothing speaks against the claim itself, but something that it rests on fails."""
+    """No evidence is against the claim itself, but something that it rests on fails."""
     CIRCULAR = "circular"
     """The claim would support itself: refused."""
     REFUTED = "refuted"
@@ -50,7 +50,7 @@ class Status(StrEnum):
 
     @property
     def supports(self) -> bool:
-        """Whether a claim of this status may be relied upon at all (how far, the policy says)."""
+        """Whether a claim of this status may be relied upon at all (the policy says how far)."""
         return self in _SUPPORTING
 
     @property
@@ -66,7 +66,7 @@ _LINK_RANK = {Link.GENERATED: 3, Link.MAPPED: 2, Link.GUIDED: 1}
 
 
 def weakest(statuses: Iterable[Status]) -> Status | None:
-    """The worst of them; None of none."""
+    """The worst of them; None if there are none."""
     return min(statuses, key=lambda status: status.rank, default=None)
 
 
@@ -76,7 +76,7 @@ def link_rank(link: Link) -> int:
 
 
 def weakest_link(links: Iterable[Link]) -> Link | None:
-    """The least mechanical link between contract and artifact; None of none."""
+    """The least mechanical link between contract and artifact; None if there are none."""
     return min(links, key=_LINK_RANK.__getitem__, default=None)
 
 
@@ -86,13 +86,13 @@ def best_link(links: Iterable[Link]) -> Link | None:
 
 @dataclass(frozen=True, slots=True)
 class Weight:
-    """What evidence amounts to: an element of the lattice."""
+    """The value of a set of evidence: an element of the lattice."""
 
     support: Status | None = None
-    """The best status that some item gives, if any supports."""
+    """The best status that an item gives, if any supports."""
     refuted: bool = False
     idle: Status | None = None
-    """The most telling of the items that neither support nor refute."""
+    """The highest-ranked status of the items that neither support nor refute."""
 
     def join(self, other: Weight) -> Weight:
         return Weight(
@@ -111,17 +111,17 @@ class Weight:
 NOTHING = Weight()
 """No evidence at all."""
 OUTDATED = Weight(idle=Status.STALE)
-"""What evidence amounts to once its claim, its inputs or its method have moved on."""
+"""The weight of evidence whose claim, inputs or method have changed."""
 
 
 def effective(evidence: Evidence) -> Verdict:
-    """The verdict that counts. What a record says beyond the strength of its method is cut down to that strength, so
-    that no bounded method gives a proof, whatever its record claims; support from a method of no strength is none."""
+    """The verdict that counts. A verdict beyond the strength of its method is reduced to that strength, so that no
+    bounded method gives a proof, whatever its record says; a method of no strength gives no support."""
     return _effective(evidence.verdict, evidence.strength)
 
 
 def weigh(evidence: Evidence) -> Weight:
-    """One current record."""
+    """The weight of one current record."""
     return _weight(evidence.verdict, evidence.strength, evidence.vacuous)
 
 
@@ -151,13 +151,14 @@ def join(weights: Iterable[Weight]) -> Weight:
 
 
 def roll_up(current: Iterable[Evidence], *, outdated: bool = False) -> Status:
-    """The status of one claim from all its current evidence; `outdated` says that there is history besides."""
+    """The status of one claim from all its current evidence; `outdated`: there are outdated records besides."""
     weight = join(weigh(evidence) for evidence in current)
     return (weight.join(OUTDATED) if outdated else weight).status
 
 
 def behind(current: Iterable[Evidence]) -> tuple[tuple[Hypothesis, ...], tuple[str, ...]]:
-    """What the status rests on, and supposes in words: of the item among those that give it that supposes least."""
+    """What the status rests on, and its assumptions in words: those of the item that assumes least among those that
+    give the status."""
     items = tuple(current)
     if not any(e.rests_on or e.hypotheses for e in items):
         return ((), ())
