@@ -7,8 +7,7 @@
     pdf.write_pdf(case, folder)         writes report.pdf, on demand: Typst needs longer than all others together
     write_index(cases, folder)          writes <folder>/index.html over all systems, with the trend over runs
 
-All are idempotent, write each file in one step and leave a file that says the same already. They return what they
-wrote.
+All are idempotent, write each file in one step and leave unchanged files alone. They return the paths of the files.
 """
 
 from __future__ import annotations
@@ -28,7 +27,7 @@ PDF = "report.pdf"
 
 
 def render_all(case: Case, folder: Path, key: Path | None = None) -> tuple[Path, ...]:
-    """Write every format of one case into `folder`, but the PDF: one that is there is of another state, and removed.
+    """Write every format of one case into `folder`, except the PDF: an existing one shows another state and is removed.
     With a private key the attestations are signed, each in an envelope on a line of its own. Raises OSError, and
     Rejected for a key that cannot be used."""
     written = []
@@ -44,14 +43,14 @@ def render_all(case: Case, folder: Path, key: Path | None = None) -> tuple[Path,
 
 
 def left_over(folder: Path, names: Iterable[str]) -> list[str]:
-    """Pages in a report's folder, of nodes that its system has no more."""
+    """The pages in a report's folder of nodes that its system no longer has."""
     return sorted({path.name for path in folder.glob("node-*.html")} - set(names))
 
 
 def formats(case: Case) -> Iterator[tuple[str, str]]:
-    """Every format but the PDF by its file name. Same case, same text."""
+    """Every format except the PDF, by its file name. Same case, same text."""
     for name, content in _formats(case):
-        yield name, content.encode("utf-8", "replace").decode()  # a tool's words may hold half a character
+        yield name, content.encode("utf-8", "replace").decode()  # a tool's text may hold half a character
 
 
 def _formats(case: Case) -> Iterator[tuple[str, str]]:

@@ -57,7 +57,7 @@ def render_answers(case: Case, json_digest: str = "") -> str:
 
 
 def render_argument(case: Case, json_digest: str = "") -> str:
-    """The page behind the first: requirements and nodes with their evidence, each assumption, what is not shown."""
+    """The page behind the first: requirements and nodes with their evidence, each assumption, and what is not shown."""
     return _render(
         "argument.html.j2",
         case,
@@ -91,7 +91,7 @@ def _render(template: str, case: Case, json_digest: str, **more: Any) -> str:
 
 
 def full_reason(assumption: Assumption) -> str:
-    """All that is said for an assumption beyond its plain words."""
+    """Everything stated for an assumption beyond its one-line text."""
     parts = [assumption.because] if assumption.because else []
     parts += [text for text in assumption.text.split("\n") if text not in (assumption.because, assumption.says)]
     told = list(dict.fromkeys(p for p in parts if p and not any(p != q and p in q for q in parts)))
@@ -99,12 +99,12 @@ def full_reason(assumption: Assumption) -> str:
 
 
 def others(case: Case, line: SupposedLine) -> list[Assumption]:
-    """The assumptions of a line's sort that it gives by number only."""
+    """The assumptions of a line's sort that it names by number only."""
     return [s for s in case.assumptions if s.number in line.others]
 
 
 def worded(case: Case) -> bool:
-    """Whether a printed first sheet has room for all assumptions in words; a sheet has no folds to open."""
+    """Whether a printed first sheet has room for all assumptions in words: paper has no folds to open."""
     return sum(len(s.words) for s in case.assumptions) + sum(len(r.text) for r in case.listed) <= SHEET_LETTERS
 
 
@@ -147,7 +147,7 @@ def _word(record: Evidence) -> str:
 
 
 def _refuted(text: str) -> Markup:
-    """What is refuted, its quotation marked as one."""
+    """The text of a refutation, with its quotation marked up."""
     before, mark, rest = text.partition("“")
     quote, end, after = rest.rpartition("”")
     if not mark or not end:

@@ -1,4 +1,5 @@
-"""A hazard as a bow-tie: causes on the left, the mitigations as barriers, the hazard, its consequences on the right."""
+"""A hazard as a bow-tie diagram: causes on the left, the mitigations as barriers, the hazard, its consequences on the
+right."""
 
 from __future__ import annotations
 
@@ -14,7 +15,7 @@ _COLUMNS = {"cause": (GAP, 152), "barrier": (192, 176), "hazard": (400, 144), "e
 
 
 def bowtie(view: HazardView) -> str:
-    """The picture as SVG. Deterministic: the same hazard gives the same bytes."""
+    """The diagram as SVG. Deterministic: the same hazard gives the same bytes."""
     hazard = view.hazard
     causes = [Box("", text, "asm") for text in hazard.causes] or [Box("", "no cause is recorded", "asm")]
     effects = [Box("", text, "asm") for text in hazard.consequences] or [Box("", "no consequence is recorded", "asm")]

@@ -1,4 +1,4 @@
-"""Two states of a case side by side, as a page: what was lost, gained, re-run, and why. Looks like the report."""
+"""Two states of a case compared on a page: what was lost, gained and re-run, and why. Styled as the report."""
 
 from __future__ import annotations
 
@@ -23,11 +23,12 @@ _KINDS = {
     "better": ("Gained: claims that stand better", "better", "good"),
     "rerun": ("Re-run, with the same verdict", "re-run", "plain"),
 }
-"""Of each kind its heading, the word after its number, and its colour (empty: by what it says now)."""
+"""For each kind its heading, the word after its number, and its colour (empty: computed from the changes)."""
 
 
 def render_comparison(old: str, new: str, changes: Sequence[tuple[str, Change]]) -> str:
-    """The page. `old` and `new` are what the reader asked to compare, as given; `changes` are with their systems."""
+    """The page. `old` and `new` are the two states as the reader named them; each of `changes` comes with its
+    system."""
     systems = {}
     for system in dict.fromkeys(name for name, _ in changes):
         mine = [change for name, change in changes if name == system]

@@ -1,6 +1,6 @@
 """A counterexample as small tables: values one below the other, a run step by step with what changed, long runs cut.
 
-What the tool says in its own notation (names in parentheses, see `Counterexample`) stands apart, in small print.
+The tool's own notation (names in parentheses, see `Counterexample`) is set apart, in small print.
 """
 
 from __future__ import annotations
@@ -12,9 +12,9 @@ from avow.base.tuning.shown import ROWS_LEFT_OUT, RUN_ROWS
 from avow.base.verdict import Counterexample
 
 ANOTHER = " (another)"
-"""Ends the name of a second value that the contract allows just as well."""
+"""The suffix of the name of a second value that the contract allows as well."""
 _FIRST, _LAST = 8, 12
-"""Rows of a long run that are shown on paper, which has no scroll bar: where it starts, and where it goes wrong."""
+"""Rows of a long run that are shown on paper, which cannot scroll: the start, and the end, where it goes wrong."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,15 +33,15 @@ class Cell:
 
 @dataclass(frozen=True, slots=True)
 class StepRow:
-    """One step, or several on end in which nothing changes that the contract speaks of."""
+    """One step, or several consecutive steps in which no value of the contract changes."""
 
     label: str
     cells: tuple[Cell, ...]
     small: str
     returns: bool
-    """The run comes back to it."""
+    """Whether the run returns to it."""
     middle: bool
-    """Left out where there is little room."""
+    """Left out if there is little room."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,9 +51,9 @@ class Run:
     small: bool
     """Whether any row has small print."""
     left_out: int
-    """How many rows are in the middle."""
+    """The number of rows in the middle."""
     beyond: int
-    """Steps that are not told here at all."""
+    """Steps that are not shown at all."""
 
 
 def is_small(name: str) -> bool:
@@ -66,14 +66,14 @@ def bare(name: str) -> str:
 
 
 def values(example: Counterexample) -> tuple[Value, ...]:
-    """The contract's values, each with the other one that is allowed, where there is one that differs."""
+    """The contract's values, each with the other allowed value, if that differs."""
     others = {n.removesuffix(ANOTHER): v for n, v in example.values if n.endswith(ANOTHER)}
     found = [Value(n, v, others.pop(n, "")) for n, v in example.values if not n.endswith(ANOTHER) and not is_small(n)]
     return (*found, *(Value(name, "", other) for name, other in others.items()))
 
 
 def small_values(example: Counterexample) -> str:
-    """What the tool calls it, in a line."""
+    """The values that have the tool's own names, in a line."""
     return "; ".join(f"{bare(name)}: {value}" for name, value in example.values if is_small(name))
 
 
@@ -101,8 +101,9 @@ def run(example: Counterexample) -> Run:
 
 
 def _groups(example: Counterexample, columns: Sequence[str]) -> Iterator[tuple[int, int]]:
-    """First and last of the steps that say the same in the contract's words; none runs over the start of the loop."""
-    if not columns:  # nothing but the tool's words: every step for itself
+    """The first and last of consecutive steps with the same values of the contract; no group crosses the start of the
+    loop."""
+    if not columns:  # only the tool's names: each step is a group of its own
         yield from ((at, at) for at in range(len(example.trace)))
         return
     start = 0

@@ -26,7 +26,7 @@ def render_json(case: Case) -> str:
 
 
 def headline(view: ObligationView) -> str:
-    """An obligation's state in a line: what refutes it first, else the newest evidence, else that there is none."""
+    """An obligation's state in a line: its refutation if there is one, else the newest evidence, else the status."""
     counting = view.records
     for record in counting:
         if record.verdict.value == "refuted":
@@ -39,13 +39,13 @@ def headline(view: ObligationView) -> str:
 
 def _result_of(case: Case) -> str:
     """``PASSED``, ``WARNED`` or ``FAILED``. Known-bad material that is as bad as expected passes its gates and supports
-    nothing: whoever asks for ``PASSED`` must not get it for that."""
+    nothing: it must not count as ``PASSED``."""
     return "FAILED" if not case.good else "WARNED" if banner_tone(case) == "open" else "PASSED"
 
 
 def _passes(case: Case, view: ObligationView) -> bool:
-    """Whether a claim passes: not one with a person's reason in place of evidence, and that of a requirement only where
-    the requirement itself is shown."""
+    """Whether a claim passes: not if a person's reason replaces evidence, and a requirement's claim only if the
+    requirement itself is shown."""
     holds = all(r.level.holds for r in case.requirements if view.id in r.obligations)
     return view.standing.supports and view.status is not Status.JUSTIFIED and holds
 
@@ -54,8 +54,8 @@ def _passes(case: Case, view: ObligationView) -> bool:
 
 
 def render_junit(case: Case) -> str:
-    """A suite for the gates, one for the requirements, and one for each node. What is refuted fails; what is merely not
-    shown is skipped, never passed: whether that matters is for the gates to say."""
+    """A suite for the gates, one for the requirements, and one for each node. Refuted claims fail; claims that are not
+    shown are skipped, never passed: the gates decide whether that matters."""
     suites = [_gates_suite(case), *([_requirements_suite(case)] if case.requirements else [])]
     nodes = dict.fromkeys(view.obligation.node for view in case.obligations)
     suites += [_suite(case, node, [v for v in case.obligations if v.obligation.node == node]) for node in nodes]
@@ -84,7 +84,7 @@ def _requirements_suite(case: Case) -> tuple[str, list[int]]:
     rows, counts = [], [len(case.requirements), 0, 0, 0]
     for r in case.requirements:
         message = f"{r.stands}: {r.answer}"
-        inside = f"<system-out>{escape(clean(message))}</system-out>"  # of one that passes: how far it is shown
+        inside = f"<system-out>{escape(clean(message))}</system-out>"  # for a passing one: how far it is shown
         if r.level is Level.REFUTED and not case.strict:
             counts[1] += 1
             inside = f'<failure type="refuted" message={_attribute(message)}>{escape(clean(message))}</failure>'
@@ -137,7 +137,7 @@ def _attribute(text: str) -> str:
 
 
 def render_sarif(case: Case, *, findings_only: bool = False) -> str:
-    """SARIF 2.1.0, with locations in the contract. `findings_only` leaves out what holds."""
+    """SARIF 2.1.0, with locations in the contract. `findings_only` leaves out claims that hold."""
     views = [v for v in case.obligations if not findings_only or not v.standing.supports]
     rules = {_rule(view): _rule_text(view) for view in views}
     names = list(rules)
@@ -247,7 +247,7 @@ def render_attestation(case: Case) -> str:
 def _statement(case: Case, node: str, views: list[ObligationView], result: str) -> dict[str, Any]:
     subjects = dict(case.digests)
     for record in (record for view in views for record in view.records):
-        subjects |= record.inputs  # the programs and data that were verified, beside contract and plan
+        subjects |= record.inputs  # the programs and data that were verified, besides contract and plan
     if not subjects:
         subjects = {f"ledger/{case.system}": case.ledger_head}
     groups: dict[str, list[str]] = {"passedTests": [], "warnedTests": [], "failedTests": []}

@@ -1,6 +1,6 @@
-"""What a report's names and marks mean, in a few lines each: requirements, assumptions, nodes, gates, deficits,
+"""The meaning of a report's names and marks, in a few lines each: requirements, assumptions, nodes, gates, deficits,
 derivations and words; elements of the argument, digests, files, runs, codes, ports, methods. `avow.report.terminal`
-tells obligations."""
+explains obligations."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from avow.report.wording import MEANINGS
 
 
 def explained(case: Case, name: str) -> Iterator[tuple[str, list[str]]]:
-    """(heading, lines) of everything in the case that bears the name, obligations apart."""
+    """(heading, lines) of everything in the case that has the name, except obligations."""
     for module in requirement_modules(case):
         r = module.requirement
         if r.id == name:
@@ -76,7 +76,7 @@ _PLACE = re.compile(r"(?P<path>[^:]+):(?P<line>[0-9]+)\Z")
 
 
 def identified(case: Case, name: str) -> Iterator[Told]:
-    """(heading, lines) of everything in the case that bears the mark."""
+    """(heading, lines) of everything in the case that has the mark."""
     if _DIGEST.match(name):
         yield from _of_digest(case, name)
     if _CODE.match(name):
@@ -103,8 +103,8 @@ def entries(case: Case) -> Iterator[Entry]:
 
 
 def left_out(case: Case, records: Iterable[Entry], name: str) -> Iterator[Told]:
-    """(heading, lines) of the ledger's records with that hash that the report does not quote: they stand in the ledger
-    alone."""
+    """(heading, lines) of the ledger's records with that hash that the report does not quote: only the ledger has
+    them."""
     if _DIGEST.match(name):
         kept = {entry.hash for entry in entries(case)}
         for entry in records:

@@ -1,8 +1,8 @@
-"""The argument as a goal structure: what the GSN and SACM exports are made of.
+"""The argument as a goal structure: the source of the GSN and SACM exports.
 
 The elements and relations are those of the GSN Community Standard, version 3. A requirement, a node and each general
 question (validation, models, contracts, tools, hazards) is a module; a goal of another module is an away goal. Each
-solution carries an assurance claim point: why the evidence may be believed, and what would defeat it.
+solution has an assurance claim point: why the evidence may be believed, and what would defeat it.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ class Sort(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Defeater:
-    """What would make evidence worthless, and what was done about it; an empty answer: nothing was done."""
+    """A doubt that would make evidence worthless, and how it was answered; an empty answer: it was not."""
 
     text: str
     answer: str
@@ -56,7 +56,7 @@ class Artifact:
     command: str
     """The command that re-runs it."""
     files: tuple[tuple[str, str], ...]
-    """(path, SHA-256) of what the tool left."""
+    """(path, SHA-256) of the files that the tool wrote."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,23 +67,23 @@ class Element:
     """Unique in all modules: ``G1``, ``Sn12``."""
     sort: Sort
     text: str
-    """A proposition, of a goal; else what the element is."""
+    """A proposition for a goal; else a description of the element."""
     supported_by: tuple[str, ...] = ()
     in_context_of: tuple[str, ...] = ()
     undeveloped: bool = False
     defeated: bool = False
-    """Of a goal: a counterexample is known. Of a solution: it is one."""
+    """For a goal: a counterexample is known. For a solution: it is a counterexample."""
     unsupported: bool = False
-    """Of a goal: what is below it does not show it."""
+    """For a goal: the elements below do not show it."""
     label: str = ""
-    """How it is known elsewhere and how it stands: ``REQ1 [shown]``."""
+    """Its name elsewhere and its status: ``REQ1 [shown]``."""
     believed: str = ""
-    """Of a solution, the assurance claim point: why the evidence may be believed."""
+    """For a solution, the assurance claim point: why the evidence may be believed."""
     defeaters: tuple[Defeater, ...] = ()
     artifact: Artifact | None = None
 
     def text_of_defeaters(self) -> tuple[str, ...]:
-        """A line for each defeater: what it is, and what was done about it."""
+        """A line for each defeater: the doubt, and its answer."""
         return tuple(f"defeater: {d.text}: {d.answer or 'open'}" for d in self.defeaters)
 
 
@@ -201,7 +201,7 @@ class _Argument:
     # -- general questions ---------------------------------------------------------------------------------------------
 
     def validation(self) -> Module | None:
-        """Whether formulas say what sentences ask for: a person's word for each requirement."""
+        """Whether formulas mean what their sentences say: a person's statement for each requirement."""
         if not self.requirements:
             return None
         solutions = []
@@ -227,7 +227,7 @@ class _Argument:
         return self.general("validation", text, solutions, whole)
 
     def models(self) -> Module | None:
-        """Whether the models that were verified behave as the programs that run."""
+        """Whether the models that were verified behave like the programs that run."""
         of_models = {v.obligation.node for v in self.case.guarantees if any(r.of is Object.MODEL for r in v.records)}
         if not of_models:
             return None
@@ -248,7 +248,7 @@ class _Argument:
         return self.general("contracts", text, [*goals, *solutions], good, goals)
 
     def tools(self) -> Module:
-        """Whether the tools answer rightly: what was done about each part that has to be trusted."""
+        """Whether the tools answer correctly: the mitigation for each part that has to be trusted."""
         solutions = [
             Element(
                 self.new(Sort.SOLUTION),
@@ -270,7 +270,7 @@ class _Argument:
             below = []
             for m in view.mitigations:
                 below.append(self.mitigation(m.name, m.claims) or self.new(Sort.GOAL))
-                if not self.mitigation(m.name, m.claims):  # what the graph keeps away
+                if not self.mitigation(m.name, m.claims):  # not in the argument's graph
                     label = f"{m.name} [{m.level}]"
                     others.append(Element(below[-1], Sort.GOAL, m.words, undeveloped=True, label=label))
             hazard = view.hazard
@@ -298,7 +298,7 @@ class _Argument:
     def general(
         self, name: str, text: str, elements: Sequence[Element], whole: bool, goals: Sequence[Element] | None = None
     ) -> Module:
-        """`whole`: whether nothing is missing below the goal. `goals`: the elements directly below it, if not all."""
+        """`whole`: whether everything below the goal is shown. `goals`: the elements directly below it, if not all."""
         below = tuple(element.name for element in (elements if goals is None else goals))
         root = Element(self.new(Sort.GOAL), Sort.GOAL, text, below, undeveloped=not below, unsupported=not whole)
         label = "" if whole else "partly shown" if below else "not shown"
@@ -328,7 +328,7 @@ class _Argument:
     # -- evidence ------------------------------------------------------------------------------------------------------
 
     def solutions(self, view: ObligationView) -> Iterator[Element]:
-        """What supports or refutes a claim: a record that does neither is no evidence."""
+        """The evidence that supports or refutes a claim: a record that does neither is left out."""
         for item in view.counting:
             record = item.entry.evidence
             weight = weigh(record)

@@ -1,4 +1,4 @@
-"""The argument for other tools: GSN in modules as gsn2x reads them."""
+"""The argument for other tools: modular GSN in gsn2x's format."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def _body(element: Element) -> dict[str, Any]:
         body["inContextOf"] = element.in_context_of
     if element.undeveloped:
         body["undeveloped"] = True
-    if element.believed:  # keys that gsn2x does not know are shown as further text
+    if element.believed:  # gsn2x shows keys that it does not know as further text
         body["assuranceClaim"] = element.believed
     if element.defeaters:
         body["defeaters"] = "\n".join(element.text_of_defeaters())

@@ -16,7 +16,7 @@ from avow.report.wording import anchor, clean
 
 WIDTH, COLUMNS, GAP, SIZE = 720, 4, 8, 12
 _LINE, _PAD, _MOST = 15, 6, 12
-"""Pixels of a line and of a margin; guarantees of a node with a box each, more are grouped."""
+"""Pixels of a line and of a margin; a node with more guarantees than this has one box for each group of them."""
 _WIDTHS = {
     **dict.fromkeys("0123456789$#_?*", 640),
     **dict.fromkeys(" ,.;:/|\\'!", 402),
@@ -37,7 +37,7 @@ STYLE = (
 
 @dataclass(frozen=True, slots=True)
 class Box:
-    """One element: its head in bold, its text, a class for its kind, and where it leads."""
+    """One element: its head in bold, its text, a class for its kind, and the target of its link."""
 
     head: str
     text: str
@@ -88,7 +88,7 @@ def _modules(case: Case) -> Iterator[tuple[Box, str, Sequence[Box]]]:
 
 
 def _panel(parts: list[str], y: int, root: Box, strategy: str, children: Sequence[Box]) -> int:
-    """One module from `y` on; where the next one begins."""
+    """Draws one module from `y` on; returns where the next one begins."""
     left, wide = WIDTH // 6, WIDTH * 2 // 3
     y = draw_box(parts, left, y, wide, root)
     if strategy:
@@ -131,12 +131,12 @@ def _texts(box: Box, width: int) -> tuple[list[str], list[str]]:
 
 
 def height_of(box: Box, width: int) -> int:
-    """Pixels that the box needs at that width."""
+    """The height in pixels that the box needs at that width."""
     return 2 * _PAD + _LINE * sum(map(len, _texts(box, width)))
 
 
 def width_of(text: str) -> float:
-    """Pixels, at least what the text takes in DejaVu Sans, and 8 % more."""
+    """An upper bound in pixels: the text's width in DejaVu Sans, plus 8 %."""
     return 1.08 * SIZE * sum(_WIDTHS.get(c, 1000) for c in text) / 1000
 
 

@@ -1,4 +1,4 @@
-"""JSON and YAML text that people can read and that is quick to write, also for ten thousand obligations."""
+"""JSON and YAML text that is easy to read and fast to write, also for ten thousand obligations."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def _json(value: Any, depth: int, margin: str) -> str:
 
 
 def yaml_text(elements: Mapping[str, Mapping[str, Any]]) -> str:
-    """Two levels of YAML with texts in double quotes: names → (key → text, list of names or truth value)."""
+    """Two levels of YAML with texts in double quotes: names → (key → text, list of names or Boolean)."""
     lines = []
     for name, body in elements.items():
         lines.append(f"{name}:")
@@ -45,6 +45,6 @@ def yaml_text(elements: Mapping[str, Mapping[str, Any]]) -> str:
 
 
 def quoted(text: str) -> str:
-    """A double-quoted YAML scalar: a JSON string, with what YAML takes for line breaks escaped too."""
+    """A double-quoted YAML scalar: a JSON string, with the characters escaped that YAML reads as line breaks."""
     escaped = json.dumps(clean(text), ensure_ascii=False)
     return _SPECIAL.sub(lambda match: f"\\u{ord(match.group()):04x}", escaped)

@@ -1,7 +1,7 @@
-"""A counterexample's places on a small map, where the plan says which table holds the places (plan: `pictures`).
+"""A counterexample's places on a small map, if the plan names the table that holds the places (plan: `pictures`).
 
-A place is told by its coordinates, ``(2, 2)``, in a value of a port, or by its label in a call that the plan names
-under `places`, ``inspect(3)``. Places of a trace are joined to a path. All text is escaped; nothing of it is markup.
+A place is given by its coordinates, ``(2, 2)``, in a value of a port, or by its label in a call that the plan names
+under `places`, ``inspect(3)``. Places of a trace are joined to a path. All text is escaped; none of it is markup.
 """
 
 from __future__ import annotations
@@ -22,7 +22,8 @@ _NUMBER = r"[-+−]?\d{1,12}(?:[./]\d{1,12})?"
 _COORDINATES = re.compile(rf"\(\s*({_NUMBER})\s*,\s*({_NUMBER})\s*\)")
 _CALL = re.compile(r"([A-Za-z_]\w{0,60})\(\s*([^\s(),]{1,40})\s*\)")
 _PORT = re.compile(r"^[A-Za-z_]\w*\.[A-Za-z_]\w*")
-"""Values of ports are the contract's; what else a tool tells (beliefs, percepts) may hold pairs that are no places."""
+"""Only values of ports are the contract's: a tool's other output (beliefs, percepts) may hold pairs that are no
+places."""
 _SIZE = 300.0
 _MARGIN = 26.0
 _STYLE = (
@@ -38,11 +39,11 @@ Place = tuple[Fraction, Fraction]
 class _Visit:
     place: Place
     when: str
-    """What names it: a variable's name, or a step."""
+    """Its name: a variable's name, or a step."""
 
 
 def draw_map(view: MapView, example: Counterexample) -> Markup:
-    """The map with the example's places marked, and what it shows in words; empty where there is nothing to mark."""
+    """The map with the example's places marked, and a caption; empty if there is nothing to mark."""
     svg, told = map_picture(view, example)
     if not svg:
         return Markup()
@@ -50,8 +51,8 @@ def draw_map(view: MapView, example: Counterexample) -> Markup:
 
 
 def map_picture(view: MapView, example: Counterexample, alone: bool = False) -> tuple[str, str]:
-    """The map as SVG, and in words; two empty texts where the example speaks of no place, or the table holds no
-    numbers. `alone`: with its own colours, for where the page's style sheet is not."""
+    """The map as SVG, and its caption; two empty texts if the example names no place, or the table holds no numbers.
+    `alone`: with its own colours, for use without the page's style sheet."""
     known = _known(view)
     if not known:
         return "", ""
@@ -68,7 +69,7 @@ def map_picture(view: MapView, example: Counterexample, alone: bool = False) -> 
 
 
 def _known(view: MapView) -> dict[str, Place]:
-    """Label → place, of every row whose coordinates are numbers."""
+    """Label → place, for every row whose coordinates are numbers."""
     found = {}
     for at, (x, y, label) in enumerate(view.points):
         place = _place(x, y)
@@ -96,7 +97,7 @@ def _places(name: str, value: str, view: MapView, known: dict[str, Place]) -> It
 
 
 def _path(example: Counterexample, view: MapView, known: dict[str, Place]) -> Iterable[_Visit]:
-    """A place is entered in the step in which it is first spoken of again: beliefs and relations persist."""
+    """A place is entered in the step that names it after one that did not: beliefs and relations persist."""
     before: set[Place] = set()
     last = None
     for at, step in enumerate(example.trace[:MAP_STEPS]):
@@ -151,7 +152,7 @@ def _svg(
 
 
 def _frame(places: Sequence[Place]) -> tuple[Place, Place]:
-    """The middle of the table's places, and how far they reach (at least 1)."""
+    """The middle of the table's places, and their extent (at least 1)."""
     xs, ys = zip(*places, strict=True)
     reach = max(max(xs) - min(xs), max(ys) - min(ys), Fraction(1))
     return ((min(xs) + max(xs)) / 2, (min(ys) + max(ys)) / 2), (reach, reach)

@@ -1,4 +1,4 @@
-"""The case as a Markdown summary: for pull requests, and for people without a browser."""
+"""The case as a Markdown summary: for pull requests, and for readers without a browser."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from avow.report.source import plain_lines
 from avow.report.wording import bound_text, clean, gate_line, mutation, open_line, where, worth
 
 _BOUNDED = (Status.CHECKED, Status.TESTED, Status.MONITORED)
-"""What these say is worth as much as their bounds."""
+"""The statuses that are shown with their bounds."""
 
 
 def render_markdown(case: Case) -> str:
-    """The summary: the five answers, the gates, the open items, the table, what is not shown."""
+    """The summary: the five answers, the gates, the open items, the table, and what is not shown."""
     parts = [
         f"# {escaped(case.title)}: assurance report",
         *markdown_head(case),
@@ -79,7 +79,8 @@ def render_markdown(case: Case) -> str:
 
 
 def _remarks(case: Case) -> Iterable[str]:
-    """How the contracts are written, brackets first: what a verdict is about depends on how a formula is read."""
+    """Remarks on how the contracts are written, brackets first: a verdict's meaning depends on how a formula is
+    read."""
     found = [item for item in case.open_items if item.kind == REMARK]
     if found:
         yield "## Remarks on contracts and models"
@@ -87,7 +88,7 @@ def _remarks(case: Case) -> Iterable[str]:
 
 
 def _contracts(case: Case) -> Iterable[str]:
-    """The contracts' texts between fences that are longer than any within."""
+    """The contracts' texts between fences that are longer than any fence within."""
     room = SUMMARY_SOURCE
     for source in case.sources:
         if not source.is_contract:

@@ -1,5 +1,5 @@
-"""The report on every claim: an overview, and a page for each node, the whole system and the contracts. No network,
-readable without a script, printable."""
+"""The report on every claim: an overview, and a page for each node, the whole system and the contracts. The pages need
+no network, are readable without a script, and are printable."""
 
 from __future__ import annotations
 
@@ -48,10 +48,10 @@ _Matrix = list[tuple[str, str, list[tuple[ObligationView, list[Status | None]]]]
 
 
 class Compiled(BytecodeCache):
-    """Templates as compiled before, kept in this user's cache: to compile them costs more than to fill them.
+    """Compiled templates, kept in this user's cache: compiling takes longer than rendering.
 
-    What is kept is code. So it is bound to the template's text by Jinja, and to its place by a seal: what was edited,
-    made up or made by another version of Jinja is none, and is made again.
+    The cached data is code, so Jinja binds it to the template's text, and a seal to its path: data that was edited,
+    forged or made by another version of Jinja is ignored and compiled again.
     """
 
     def load_bytecode(self, bucket: Bucket) -> None:
@@ -64,7 +64,7 @@ class Compiled(BytecodeCache):
         bucket.write_bytecode(made)
         try:
             write(_compiled(bucket), sealed(_compiled(bucket), made.getvalue()))
-        except OSError:  # a read-only home: it is compiled in each run
+        except OSError:  # a read-only home: the templates are compiled in each run
             return
 
 
@@ -122,8 +122,8 @@ def environment() -> Environment:
 
 
 def render_page(case: Case, json_digest: str = "") -> str:
-    """The overview of every claim. Deterministic: same case, same bytes. `json_digest` is of the report.json that
-    stands beside it: with it no part of that file can be edited unseen, not even what no other format shows."""
+    """The overview of every claim. Deterministic: same case, same bytes. `json_digest` is the digest of the report.json
+    beside it: with it no edit of that file goes unnoticed, not even of a part that no other format shows."""
     single = set(case.single_method)
     matrix = _matrix(case)
     listed = [item for item in case.open_items if not item.advice]
@@ -158,7 +158,8 @@ def render_page(case: Case, json_digest: str = "") -> str:
 def render_details(case: Case) -> Iterator[tuple[str, str]]:
     """Every claim in full, as (file name, page): the whole system with its derivations, each node, the contracts.
 
-    They name neither run nor date: a run that changes nothing of a node leaves its page as it is."""
+    They name neither run nor date: a run that changes nothing of a node leaves its page unchanged.
+    """
     nodes = {SYSTEM_LEVEL: list[ObligationView](), **by_node(case)}
     pages = [("the whole system" if node == SYSTEM_LEVEL else node, wording.page_of(node)) for node in nodes]
     pages += [("contracts", "contracts.html")] if case.sources else []
@@ -180,7 +181,7 @@ def _fill(template: str, case: Case, **more: Any) -> str:
         .render(
             case=case,
             known=known_pages(case),
-            style=Markup(asset("style.css")),  # our own files, in the package
+            style=Markup(asset("style.css")),  # Avow's own files, in the package
             script=Markup(asset("script.js")),
             **more,
         )
@@ -188,12 +189,12 @@ def _fill(template: str, case: Case, **more: Any) -> str:
 
 
 def known_pages(case: Case) -> dict[str, str]:
-    """Each obligation, with the page that has all of it."""
+    """Each obligation, with the page that shows all of it."""
     return {view.id: wording.page_of(view.obligation.node) for view in case.obligations}
 
 
 def by_node(case: Case) -> dict[str, list[ObligationView]]:
-    """Every obligation, in reading order: the nodes as the contract has them, then the whole system."""
+    """Every obligation, in reading order: the nodes in the contract's order, then the whole system."""
     found: dict[str, list[ObligationView]] = {}
     for view in sorted(case.obligations, key=_reading_order(case)):
         found.setdefault(view.obligation.node, []).append(view)
@@ -205,7 +206,7 @@ _RULE = re.compile(r"^[─—-]{5,}$")
 
 
 def _derivation(text: str, title: str) -> Markup:
-    """A derivation as the paper sets it: premises over a line over the conclusion, with subscripts."""
+    """A derivation in the paper's notation: premises over a line over the conclusion, with subscripts."""
     rows = []
     below = False
     for line in text.splitlines():
@@ -236,7 +237,7 @@ def _subscripts(escaped: str) -> str:
 
 
 def _timelines(details: Mapping[str, Any]) -> Markup:
-    """What was heard in the recorded runs, and where it was wrong; empty where no evidence says so."""
+    """Timelines of the recorded runs, with the places where they fail; empty if no evidence has any."""
     figures = [
         Markup('<figure class="lanes">{}<figcaption>{}</figcaption></figure>').format(picture(one), in_words(one))
         for one in timelines(details)
@@ -249,12 +250,12 @@ def _math(text: str) -> Markup:
 
 
 def _ticks(text: str) -> Markup:
-    """A sentence of ours with its `commands` set as code; everything in it is escaped first."""
+    """A sentence of Avow's with its `commands` set as code; everything in it is escaped first."""
     return Markup(re.sub("`([^`]+)`", r"<code>\1</code>", str(escape(text))))
 
 
 def render_traceability(case: Case, rows: Sequence[Row]) -> str:
-    """The traceability matrix as a page: coverage and orphans first, then each requirement with what it rests on."""
+    """The traceability matrix as a page: coverage and orphans first, then each requirement with the claims below it."""
     guarantees = {view.id for view in case.guarantees}
     serving = {row.obligation for row in rows if row.requirement and row.obligation in guarantees}
     reached = {row.requirement for row in rows if row.requirement and row.evidence}
@@ -277,7 +278,7 @@ def render_traceability(case: Case, rows: Sequence[Row]) -> str:
 
 
 def _by_claim(rows: Sequence[Row]) -> list[tuple[Row, list[Row]]]:
-    """Paths to one claim together: the first of them, and all that bear evidence."""
+    """Paths to one claim, grouped: the first of them, and all that have evidence."""
     found: dict[tuple[str, ...], list[Row]] = {}
     for row in rows:
         key = (row.requirement, row.derivation, row.obligation, row.remark, "" if row.obligation else str(len(found)))
@@ -306,7 +307,7 @@ def _in_full(views: Sequence[ObligationView]) -> set[str]:
 
 
 def _found(view: ObligationView) -> str:
-    """What refutes a claim, in a line; empty where nothing does."""
+    """The counterexample of a claim, in a line; empty if there is none."""
     shown = next((e.counterexample for e in view.records if e.counterexample), None)
     text = shown.text() if shown is not None and not view.status.supports else ""
     return text if len(text) <= FINDING_CHARACTERS else text[: FINDING_CHARACTERS - 1] + "…"
@@ -320,7 +321,7 @@ def _by_item(items: Sequence[OpenItem]) -> dict[str, list[OpenItem]]:
 
 
 def _counts(views: Sequence[ObligationView]) -> list[tuple[str, list[tuple[Status, int]], int]]:
-    """GNATprove's table: for each kind of claim, how many stand where."""
+    """GNATprove's table: for each kind of claim, the number of claims with each status."""
     table = []
     for kind in KINDS:
         for advice in (False, True):
@@ -332,20 +333,20 @@ def _counts(views: Sequence[ObligationView]) -> list[tuple[str, list[tuple[Statu
 
 
 def _stands(statuses: Iterable[Status]) -> list[tuple[Status, int]]:
-    """How many stand where, best first."""
+    """The number of claims with each status, best first."""
     found = Counter(statuses)
     return [(status, found[status]) for status in Status if found[status]]
 
 
 def _used_methods(case: Case) -> list[str]:
-    """Method ids that answer for guarantees, or should, in the plan's order."""
+    """Ids of the methods planned for guarantees or used for them, in the plan's order."""
     planned = [name for view in case.guarantees for name, _ in view.planned]
     in_plan = [name for node in case.nodes for name, _ in node.methods if name in planned]
     return list(dict.fromkeys((*in_plan, *planned)))
 
 
 def _matrix(case: Case) -> _Matrix:
-    """Node by node: each guarantee with the status that each method gives it (None: the method is not used for it)."""
+    """For each node: each guarantee with the status that each method gives it (None: the method is not used for it)."""
     methods = _used_methods(case)
     rows: dict[str, list[tuple[ObligationView, list[Status | None]]]] = {}
     for view in case.guarantees:
@@ -364,7 +365,7 @@ def _cell(view: ObligationView, method: str) -> Status | None:
 
 
 def svg_image(text: str) -> str:
-    """A picture as the source of an image: nothing that it contains can run. Empty where there is no picture."""
+    """A picture as the source of an image: no script in it can run. Empty if there is no picture."""
     if not text:
         return ""
     return "data:image/svg+xml;base64," + base64.b64encode(text.encode("utf-8", "replace")).decode()
@@ -380,8 +381,8 @@ def _justified(case: Case) -> list[tuple[ObligationView, Any]]:
 
 
 def resting(case: Case) -> dict[str, list[tuple[Status, int]]]:
-    """How many claims of which status each supported requirement rests on, through derivations and all: one word for
-    the weakest of them does not tell that five others were only tested. Empty where that would take too long."""
+    """The number of claims of each status that each supported requirement rests on, derivations included: the weakest
+    status alone does not show that five others were only tested. Empty if computing it would take too long."""
     if len(case.requirements) * len(case.obligations) > SUPPORT_STEPS:
         return {}
     below = {view.id: view.rests_on for view in case.obligations}

@@ -1,4 +1,4 @@
-"""The case as PDF, set by Typst: offline, with its own fonts, same bytes every time."""
+"""The case as PDF, typeset by Typst: offline, with its own fonts, same bytes every time."""
 
 from __future__ import annotations
 
@@ -30,11 +30,11 @@ from avow.report.source import plain_lines
 from avow.report.wording import MARKS, bound_text, clean, in_lines, protocol, tone, worth
 
 _GATES = {"passes": "good", "fails": "bad", "not asked": "plain"}
-"""Colours."""
+"""The colour of each gate state."""
 
 
 def render_pdf(case: Case) -> bytes:
-    """Same case, same bytes. Raises Rejected (``CLI023``) where Typst is missing or fails."""
+    """Same case, same bytes. Raises Rejected (``CLI023``) if Typst is missing or fails."""
     try:
         import typst  # an optional package
 
@@ -149,7 +149,7 @@ def _source(source: SourceView) -> dict[str, Any]:
 
 
 def _first(case: Case) -> dict[str, Any]:
-    """The first sheet: the page's first screen."""
+    """The first sheet: the content of the page's first screen."""
     a = case.answers
     many = len(case.listed) < len(case.requirements)
     return {
@@ -261,7 +261,7 @@ def _obligation(case: Case, view: ObligationView) -> dict[str, Any]:
 
 
 def _counter(case: Case, shown: Counterexample) -> dict[str, Any]:
-    """The contract's values and the run as on the page, without the tool's own words and the middle of long runs."""
+    """The contract's values and the run as on the page, without the tool's own names and the middle of long runs."""
     told, found = example.values(shown), example.run(shown)
     rows = [row for row in found.rows if not row.middle]
     notes = [f"{found.left_out + found.beyond} rows in the middle are left out"] if found.left_out else []
@@ -300,5 +300,5 @@ def _clean(value: Any) -> Any:
             return {key: _clean(item) for key, item in value.items()}
         case list() | tuple():
             return [_clean(item) for item in value]
-        case _:  # a number, a truth value or None
+        case _:  # a number, a Boolean or None
             return value

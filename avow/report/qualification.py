@@ -1,4 +1,4 @@
-"""What the qualification of Avow as a tool needs, for one case: requirements, known problems, figures, independence.
+"""The data for the qualification of Avow as a tool, for one case: requirements, known problems, figures, independence.
 
 The data beside this module (`qualification.yaml`) are kept by hand; everything else is computed from the case.
 """
@@ -20,7 +20,7 @@ from avow.evidence.status import weigh
 from avow.report.page import asset, environment
 
 DATA = "qualification.yaml"
-"""What is kept by hand."""
+"""The file that is kept by hand."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,9 +32,9 @@ class Independence:
     tools: int
     """Methods that differ pairwise in backend and in tool."""
     ends: tuple[str, ...]
-    """Ways from the contract to what was judged."""
+    """How the contract was interpreted: by a person's judgement, or by Avow's parser and type checker."""
     objects: tuple[str, ...]
-    """What was examined."""
+    """The kinds of object that were examined."""
     persons: tuple[str, ...]
     """Reviewers; two names of one person are one."""
 

@@ -25,14 +25,14 @@ KINDS: Mapping[str, tuple[str, ...]] = {
     "Claim": (TEXT, "Status", "Formula", "Remark"),
     "Evidence": (TEXT, "Verdict", "Method", "Link", "Tool", "Tool output", "SHA-256", "Re-run"),
 }
-"""Each kind of object with its attributes, beside ReqIF.ForeignID."""
+"""Each kind of object with its attributes, besides ReqIF.ForeignID."""
 RELATIONS = ("is mitigated by", "rests on", "is shown by")
 _Name = tuple[str, str]
-"""(kind, what it is called)."""
+"""(kind, name)."""
 
 
 def render_reqif(case: Case, rows: Sequence[Row]) -> str:
-    """The traceability of a case, and a specification that lists each requirement with what it rests on."""
+    """The traceability of a case, and a specification that lists each requirement with the claims below it."""
     objects: dict[_Name, dict[str, str]] = {}
     links: dict[tuple[str, _Name, _Name], str] = {}
     views = {view.id: view for view in case.obligations}
@@ -89,7 +89,7 @@ def render_reqif(case: Case, rows: Sequence[Row]) -> str:
             below=below,
             id=lambda *parts: Markup(f'"{identifier(*parts)}"'),
             ref=lambda *parts: Markup(identifier(*parts)),
-            q=lambda text: Markup(quoteattr(clean(text))),  # quoted as XML, with the marks around it
+            q=lambda text: Markup(quoteattr(clean(text))),  # quoted as XML, with the quotation marks
             clean=clean,
             when=f"{case.today}T00:00:00Z",
         )
@@ -97,5 +97,5 @@ def render_reqif(case: Case, rows: Sequence[Row]) -> str:
 
 
 def identifier(*parts: str) -> str:
-    """An xsd:ID for what the parts name."""
+    """An xsd:ID for the object that the parts name."""
     return f"_{sha256(chr(0).join(parts))[:32]}"

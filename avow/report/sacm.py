@@ -1,9 +1,8 @@
 """The argument as a structured assurance case: OMG SACM 2.3, as XMI.
 
-A goal is a claim, a strategy the reasoning of an inference, a
-solution an artifact reference that supports its claim by evidence, a context or an assumption a claim in context. An
-assurance claim point is a meta-claim of the evidence's relationship; a defeater is a counter-inference to it, and is
-itself defeated where something was done about it.
+A goal is a claim, a strategy the reasoning of an inference, a solution an artifact reference that supports its claim by
+evidence, a context or an assumption a claim in context. An assurance claim point is a meta-claim of the evidence's
+relationship; a defeater is a counter-inference to it, and is itself defeated if it has an answer.
 """
 
 from __future__ import annotations
@@ -114,7 +113,8 @@ class _Writer:
             )
 
     def claim_point(self, package: ET.Element, about: str, solution: Element) -> dict[str, str]:
-        """The meta-claim of an evidence relationship, with its defeaters; none where nothing is said of it."""
+        """The meta-claim of an evidence relationship, with its defeaters; empty if the solution has no assurance claim
+        point."""
         if not solution.believed:
             return {}
         point = f"ACP-{about}"
@@ -158,7 +158,7 @@ class _Writer:
 
 
 def _declared(element: Element) -> str:
-    """A claim's declaration in SACM's words."""
+    """A claim's declaration in SACM's terms."""
     if element.sort is Sort.ASSUMPTION:
         return "assumed"
     if element.defeated:

@@ -1,4 +1,5 @@
-"""The five answers in few words: on a terminal of 24 lines, as a comment of 150 words, at the head of the Markdown."""
+"""The five answers in few words: for a terminal of 24 lines, as a comment of 150 words, and at the head of the
+Markdown."""
 
 from __future__ import annotations
 
@@ -15,7 +16,7 @@ _MARKDOWN = re.compile(r"([\\`*_{}\[\]#|<>~&$])")
 
 
 def terminal_lines(case: Case) -> list[str]:
-    """At most 24 lines of 80 columns, in the order of the first page; the last says the one thing to do next."""
+    """At most 24 lines of 80 columns, in the order of the first page; the last names the next step."""
     a = case.answers
     verdict = f": {a.verdict}"
     title = _cut(f"{a.tone.mark} {case.title}", WIDTH - len(verdict))
@@ -39,14 +40,15 @@ def terminal_lines(case: Case) -> list[str]:
         at = next(n for n, line in enumerate(lines) if line.startswith("4 Assumed"))
         lines = [*lines[:at], *known, *lines[at:]]
     over = len(lines) - (LINES - 1)
-    if over > 0:  # a sort of assumptions, or two, whose number stands in the verdict
+    if over > 0:  # drops one or two sorts of assumptions, which the verdict counts
         at = next(n for n, line in enumerate(lines) if line.startswith("5 Changed"))
         lines = [*lines[: at - over - 1], "  …", *lines[at:]]
     return [*lines, _cut(f"next: {_next(case)}")]
 
 
 def comment(case: Case) -> str:
-    """A comment for a change under review: at most 150 words outside its fold. The first line finds it again."""
+    """A comment for a change under review: at most 150 words outside its fold. Its first line identifies it for
+    updates."""
     a = case.answers
     was = f"{case.baseline.verdict} → " if case.baseline else ""
     lines = [
@@ -152,5 +154,5 @@ def _few(text: str, most: int = 24) -> str:
 
 
 def escaped(text: str) -> str:
-    """Any text as Markdown of one line."""
+    """Any text as one line of Markdown."""
     return _MARKDOWN.sub(r"\\\1", " ".join(clean(text).split()))

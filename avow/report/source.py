@@ -1,7 +1,7 @@
-"""Contracts and plan as written, for the HTML page: numbered lines, coloured by Pygments, with what came of each.
+"""Contracts and plan as written, for the HTML page: numbered lines, coloured by Pygments, with the result for each.
 
-A comment may hold anything, so every piece of text is escaped here, and characters that a reader would not see but
-that change what is read (controls of writing direction, invisible blanks) are shown by their numbers.
+A comment may hold anything, so every piece of text is escaped here, and invisible characters that change the reading
+(direction controls, invisible blanks) are shown by their code points.
 """
 
 from __future__ import annotations
@@ -35,14 +35,15 @@ _COLOURS: tuple[tuple[_TokenType, str], ...] = (
     (Name.Class, "l"),
     (Name.Variable, "v"),
 )
-"""Pygments' token types → the style sheet's classes (``.src .c``…); what is not here has the text's colour."""
+"""Pygments' token types → the style sheet's classes (``.src .c``…); other types have the text's colour."""
 
 _HIDDEN = re.compile("[\r\u00ad\u061c\u180e\u200b-\u200f\u202a-\u202e\u2060-\u2069\ufeff\u2028\u2029\u0085]")
-"""Characters that show nothing, or turn the order of what follows: a comment could make code look like a comment."""
+"""Characters that are invisible, or reverse the order of the text after them: a comment could make code look like a
+comment."""
 
 
 def _line_anchor(number: int, line: int) -> str:
-    """The fragment of a line of the `number`-th text, from 1."""
+    """The fragment of a line of the `number`-th text, counted from 1."""
     return f"s{number}-{line}"
 
 
@@ -52,7 +53,7 @@ def places(case: Case) -> Mapping[str, tuple[int, int]]:
 
 
 def location(span: Span | None, known: Mapping[str, tuple[int, int]]) -> Markup:
-    """``contracts/x/system.rcl:12``, as a link to the line where the text is on the page; empty without a place."""
+    """``contracts/x/system.rcl:12``, as a link to the line if the text is on the page; empty without a position."""
     if span is None:
         return Markup()
     shown = escape(f"{span.file}:{span.line}")
@@ -63,7 +64,7 @@ def location(span: Span | None, known: Mapping[str, tuple[int, int]]) -> Markup:
 
 
 def lines_of(case: Case, number: int) -> Markup:
-    """The `number`-th text, line by line; beside a guarantee's or a requirement's line stands what came of it."""
+    """The `number`-th text, line by line; a guarantee's or a requirement's line has its result beside it."""
     source = case.sources[number - 1]
     notes: dict[int, list[str]] = {}
     needed: set[int] = set()
@@ -80,7 +81,8 @@ def lines_of(case: Case, number: int) -> Markup:
 
 
 def _pointing(case: Case) -> Iterator[tuple[Span, str]]:
-    """Everything in the report that has a place: the place, and a mark to put there for what a person wrote."""
+    """Everything in the report that has a position: the position, and a mark to put there if a person wrote the
+    claim."""
     for view in case.obligations:
         if view.obligation.span is not None:
             yield view.obligation.span, _mark(view) if view.obligation.kind is Kind.GUARANTEE else ""
@@ -109,7 +111,7 @@ def _lexer(is_contract: bool) -> Lexer:
 
 @cache
 def _colour(kind: _TokenType) -> str:
-    """The name that a kind of token has in the style sheet; empty for most."""
+    """The style sheet's name for a kind of token; empty for most."""
     return next((name for found, name in _COLOURS if kind in found), "")
 
 
@@ -136,12 +138,12 @@ def _shown(piece: str) -> str:
 
 
 def visible_lines(text: str) -> list[str]:
-    """The lines as the compiler counts them: a line ends with a line feed, and with nothing else."""
+    """The lines as the compiler counts them: only a line feed ends a line."""
     lines = [line.removesuffix("\r") for line in text.split("\n")]
     return lines[:-1] if len(lines) > 1 and not lines[-1] else lines
 
 
 def plain_lines(source: SourceView) -> Iterable[str]:
-    """The lines for formats without markup of their own; what is not visible is told by its number."""
+    """The lines for formats without markup of their own; invisible characters are shown by their code points."""
     for line in visible_lines(source.text):
         yield _HIDDEN.sub(lambda m: f"<U+{ord(m.group()):04X}>", clean(line))

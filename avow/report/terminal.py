@@ -28,7 +28,7 @@ _COLOURS = {"good": "green", "fair": "blue", "open": "yellow", "bad": "red"}
 
 
 def show_obligation(case: Case, view: ObligationView, console: Console | None = None) -> None:
-    """Print all that is known of an obligation."""
+    """Print everything known about an obligation."""
     out = console or Console(highlight=False)
     o = view.obligation
     out.print(f"[bold]{escape(view.id)}[/]   {_status(view.standing)} [dim]{MEANINGS[view.standing]}[/]")
@@ -82,7 +82,7 @@ def show_obligation(case: Case, view: ObligationView, console: Console | None = 
 
 
 def _show_changes(example: Counterexample, out: Console) -> None:
-    """A run that is too wide for a table: of each step what has changed, in the contract's words."""
+    """A run that is too wide for a table: for each step the contract's values that have changed."""
     before: dict[str, str] = {}
     for at, step in enumerate(example.trace[:60]):
         values = {name: value for name, value in step if not name.startswith("(")}

@@ -1,4 +1,4 @@
-"""Words, marks and names that all formats share, so that a claim looks and reads the same everywhere."""
+"""Words, marks and names that all formats share, so that a claim looks and reads the same in every format."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ _SHOWN = {
         "one tool proves it, another refutes it: one of them is wrong, or they were shown different things",
     ),
 }
-"""Of each status its mark (colour is never the only sign), its colour, and what it says."""
+"""For each status its mark (colour is never the only sign), its colour, and its meaning."""
 
 MARKS = {status: mark for status, (mark, _, _) in _SHOWN.items()}
 MEANINGS = {status: meaning for status, (_, _, meaning) in _SHOWN.items()}
@@ -60,43 +60,44 @@ def tone(status: Status) -> str:
 
 
 def anchor(claim: str) -> str:
-    """A fragment for a claim: readable, and safe in an attribute whatever the claim is called."""
+    """A fragment for a claim: readable, and safe in an attribute whatever the claim's name is."""
     return quote(claim, safe="/._-", errors="replace")
 
 
 def page_of(node: str) -> str:
-    """The page with all of a node's claims; of the whole system's, those of no single node."""
+    """The page with all of a node's claims; for claims of no single node, the whole system's page."""
     if node == SYSTEM_LEVEL:
         return "system.html"
     return f"node-{node if re.fullmatch('[A-Za-z0-9_.-]+', node) else sha256(node)[:16]}.html"
 
 
 def rerun(view: ObligationView, evidence: Evidence) -> str:
-    """The command that asks this method again, from the workspace's folder."""
+    """The command that re-runs this method, from the workspace's folder."""
     return naming.rerun(view.obligation, evidence.method)
 
 
 def tool_command(evidence: Evidence) -> str:
-    """The command that was run, quoted for a shell; empty where the method runs within Avow.
+    """The command that was run, quoted for a shell; empty if the method runs within Avow.
 
-    A tool runs where the method's exported files lie, a copy of their folder: what tools say of a guarantee begins
-    with the way to that folder from the workspace's, so that it can be run as it is printed.
+    A tool runs in a copy of the folder with the method's exported files: the command for a guarantee begins with the
+    path from the workspace's folder to that folder, so that it can be run as printed.
     """
     command = shlex.join(evidence.command)
     match evidence.obligation.split("/", 3):
         case [system, node, Kind.GUARANTEE, _] if command:
             return f"(cd {shlex.quote(f'artifacts/{system}/{node}/{evidence.method}')} && {command})"
-        case _:  # not a method's tool: it runs where the run was started
+        case _:  # not a method's tool: it runs in the run's working folder
             return command
 
 
 def worth(evidence: Evidence) -> Status:
-    """What a record counts as: a pass whose trigger was never met is vacuous, whatever verdict the tool gave."""
+    """The status that a record counts as: a pass whose trigger was never met is vacuous, whatever verdict the tool
+    gave."""
     return weigh(evidence).status
 
 
 def gate_line(reason: str, most: int = 200) -> str:
-    """A gate's reason in a line: whole parts of it while they fit, and how many are left out; JSON has all of it."""
+    """A gate's reason in a line: as many whole parts as fit, and the number left out; JSON has all of it."""
     if len(reason) <= most:
         return reason
     first, *parts = reason.split("; ")
@@ -107,7 +108,7 @@ def gate_line(reason: str, most: int = 200) -> str:
 
 
 def within(view: ObligationView, status: Status, most: int = 160) -> str:
-    """The bounds of the evidence that gives a claim this status: "tested" says nothing without its number of cases."""
+    """The bounds of the evidence that gives a claim this status: "tested" means nothing without its number of cases."""
     records = view.records
     texts = [bound_text(e.bound) for e in records if e.bound and worth(e) is status]
     text = "; ".join(dict.fromkeys(texts))
@@ -115,12 +116,12 @@ def within(view: ObligationView, status: Status, most: int = 160) -> str:
 
 
 def protocol(evidence: Evidence) -> str:
-    """How measured runs were made, in the plan's words; empty where nothing was measured."""
+    """How measured runs were made, in the plan's words; empty if nothing was measured."""
     return _text(evidence, "protocol")
 
 
 def overhead(evidence: Evidence) -> str:
-    """What a method costs the running robot, as somebody has measured it; empty where nobody has."""
+    """The method's cost for the running robot, as measured; empty if it was not measured."""
     return _text(evidence, "overhead")
 
 
@@ -145,7 +146,7 @@ def clean(text: str) -> str:
 
 
 def open_line(case: Case) -> str:
-    """How the open items and the plan's expected findings add up; empty where the plan speaks of none of them."""
+    """How the open items and the plan's expected findings add up; empty if the plan handles none of them."""
     said = {advice: sum(i.advice is advice and bool(i.handled) for i in case.open_items) for advice in (False, True)}
     if not any(said.values()):
         return ""
@@ -155,8 +156,8 @@ def open_line(case: Case) -> str:
 
 
 def banner_tone(case: Case) -> str:
-    """Green is for a case whose requirements are shown: known-bad material, expected or accepted, is none, and neither
-    is a plan without a requirement."""
+    """Green is for a case whose requirements are shown, not for known-bad material, expected or accepted, and not for a
+    plan without a requirement."""
     if not case.good:
         return "bad"
     return "good" if case.answers.headline.holds and not case.answers.warned else "open"
@@ -167,7 +168,7 @@ _CONNECTIVES = ("→↔⇒⇔", "∨", "∧")
 
 
 def in_lines(formula: str) -> str:
-    """A long formula broken before its connectives, the weakest outermost; not a character but blanks is changed."""
+    """A long formula broken before its connectives, the weakest outermost; only blanks are changed."""
     if "\n" in formula:
         return formula
     lines: list[str] = []
@@ -184,7 +185,7 @@ def in_lines(formula: str) -> str:
 
 def _split(text: str) -> list[tuple[int, str]]:
     """The parts with their indentation: cut before the weakest connectives outside parentheses, else after a
-    quantifier's dot; where there is neither, within the outermost parentheses that have one. Nothing where none has."""
+    quantifier's dot; if there is neither, within the outermost parentheses that have one. Empty if none have."""
     for depth in range(4):
         inner = 2 if depth or text[0] in "∧∨→↔⇒⇔" else 0
         cuts, kind = _cuts(text, depth)
@@ -201,7 +202,7 @@ def _split(text: str) -> list[tuple[int, str]]:
 
 
 def _cuts(text: str, wanted: int) -> tuple[list[int], str]:
-    """Where to cut at one depth of parentheses, and at what: what follows a dot is within its quantifier's scope."""
+    """Where to cut at one depth of parentheses, and at what: text after a dot is within its quantifier's scope."""
     found: dict[str, list[int]] = {}
     depth = 0
     for at, c in enumerate(text):
@@ -222,7 +223,7 @@ def _cuts(text: str, wanted: int) -> tuple[list[int], str]:
 
 
 def bound_text(bound: Mapping[str, Any]) -> str:
-    """``cases 2000, seed 0``; ``every state explored, for each i in 0…12, 25 properties`` of a state space."""
+    """``cases 2000, seed 0``; for a state space ``every state explored, for each i in 0…12, 25 properties``."""
     return ", ".join(_one_bound(name, value) for name, value in bound.items() if value not in ([], (), {}, ""))
 
 
@@ -234,7 +235,7 @@ def _one_bound(name: str, value: Any) -> str:
             return f"for each {' and '.join(map(str, names))}"
         case "properties" | "states" | "transitions", int() if not isinstance(value, bool):
             return f"{_plain(value)} {name if value != 1 else _SINGULAR[name]}"
-        case _:  # bounds of any method, by the name that it gives them
+        case _:  # bounds of any method, by the method's name for them
             return f"{name.replace('_', ' ')} {_plain(value)}"
 
 
@@ -242,8 +243,8 @@ _SINGULAR = {"properties": "property", "states": "state", "transitions": "transi
 
 
 def mutation(evidence: Evidence) -> str:
-    """How sharp the evidence is, where it was measured (details: ``mutation``): ``46 of 50 mutants killed``, and what
-    was changed in those that it did not notice, or that could not be judged."""
+    """The mutation score, if measured (details: ``mutation``): ``46 of 50 mutants killed``, and the changes in the
+    mutants that survived or could not be judged."""
     match evidence.details.get("mutation"):
         case {"killed": int(killed), "mutants": int(mutants), **more}:
             parts = [f"{killed} of {mutants} mutants killed"]
@@ -269,7 +270,7 @@ def _difference(found: dict[str, Any]) -> str:
 
 
 def outline(evidence: Evidence) -> str:
-    """A proof outline, where the method left one (details: ``outline`` or ``proof_outline``, or ``triples``)."""
+    """A proof outline, if the method left one (details: ``outline`` or ``proof_outline``, or ``triples``)."""
     for key in ("outline", "proof_outline"):
         match evidence.details.get(key):
             case str(text):
@@ -285,7 +286,7 @@ def outline(evidence: Evidence) -> str:
 
 
 def details_text(evidence: Evidence) -> str:
-    """Whatever else a method left in its details, as indented text."""
+    """Everything else in a method's details, as indented text."""
     shown = {"outline", "proof_outline", "triples", "mutation", RETRY, "protocol", "overhead", "timeline"}
     rest = {
         key: value for key, value in evidence.details.items() if key not in shown and value not in ("", [], {}, None)
