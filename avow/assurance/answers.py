@@ -1,8 +1,8 @@
 """The five answers that a report gives first, as data: words and counts that no format computes again.
 
-What is claimed, on what is it based, what is the weakest evidence, what is supposed without being shown, and what
-changed since the last signed report. Evidence and assumptions are two orders, never one: a person's reason is not weak
-evidence, it is none.
+What is claimed, on what is it based, what is the weakest evidence, what is assumed without being shown, and what
+changed since the last signed report. Evidence and assumptions are ordered separately: a person's reason is not weak
+evidence; it is no evidence.
 """
 
 from __future__ import annotations
@@ -17,45 +17,45 @@ from avow.system.statements import GENERAL
 
 
 class Tone(StrEnum):
-    """A colour; it never stands without a mark and a word."""
+    """A colour; it is always shown with a mark and a word."""
 
     GREEN = "green"
     """Derived without bounds, on proofs and exhaustive checks only, every assumption owned and in date."""
     AMBER = "amber"
-    """It holds, but less is known than that."""
+    """It holds, but on less than green needs."""
     RED = "red"
     """Open, refuted, or a gate fails."""
     GREY = "grey"
-    """Not relied upon: as bad as was expected."""
+    """Not relied upon: as bad as expected."""
 
     @property
     def rank(self) -> int:
-        """Greater is better; grey is no place in this order."""
+        """Greater is better; grey has no place in this order."""
         return {Tone.GREEN: 2, Tone.AMBER: 1, Tone.RED: 0, Tone.GREY: 0}[self]
 
     @property
     def mark(self) -> str:
-        """Stands beside the word."""
+        """The mark shown beside the word."""
         return {Tone.GREEN: "✔", Tone.AMBER: "◐", Tone.RED: "✘", Tone.GREY: "▽"}[self]
 
 
 class Level(StrEnum):
-    """How far a requirement, or the whole case, is shown: the least of what lies below it. Best first."""
+    """How far a requirement, or the whole case, is shown: the lowest level of the claims below it. Best first."""
 
     SHOWN = "shown"
-    """Every guarantee below is proved, or checked exhaustively, of what runs."""
+    """Every guarantee below is proved, or checked exhaustively, of the program that runs."""
     MODELS = "shown of models"
-    """Some guarantee below is proved or checked of a model only: what runs may differ."""
+    """Some guarantee below is proved or checked of a model only: the program that runs may differ."""
     TESTS = "shown by tests"
     """Some guarantee below, or the requirement itself, is sampled: tests, recordings, measurements."""
     ARGUED = "argued"
-    """A person says that the guarantees named amount to the sentence, or that some guarantee below holds."""
+    """A person states that the guarantees named amount to the sentence, or that some guarantee below holds."""
     NOT_SHOWN = "not shown"
     """Missing, stale, refuted below, not validated, or resting on an assumption that has expired."""
     REFUTED = "refuted"
     """There is a counterexample."""
     EXAMINED = "examined, not relied upon"
-    """Of a case only: known-bad material that is as bad as its plan expects, or a plan that names no requirement."""
+    """For a case only: known-bad material that is as bad as its plan expects, or a plan that names no requirement."""
 
     @property
     def holds(self) -> bool:
@@ -71,11 +71,11 @@ MEANINGS = {
     Level.REFUTED: "there is a counterexample",
     Level.EXAMINED: "known-bad material, or a plan that names no requirement",
 }
-"""The words of verdicts, in a phrase each; docs/reading-a-report.md has the same table."""
+"""The meaning of each verdict's word, in a phrase; docs/reading-a-report.md has the same table."""
 
 
 class Sort(StrEnum):
-    """What an assumption is about."""
+    """The topic of an assumption."""
 
     WORLD = "the world"
     PLATFORM = "the platform"
@@ -93,7 +93,7 @@ ABOUT = {
     Sort.MEANING: "about requirements' meaning",
     Sort.TOOLS: "about trusted tools",
 }
-"""What an assumption of each sort is about, after its number: ``2 about the world``."""
+"""The topic of each sort of assumption, after a count: ``2 about the world``."""
 
 
 PLATFORM, MODELS, SAMPLES, RECORDINGS, START, TOOLS = GENERAL
@@ -104,27 +104,28 @@ class Assumption:
     """Something that requirements, or other guarantees, rest on without its being shown, each once."""
 
     number: str
-    """``A1``: on this report's pages only; `key` is what stays."""
+    """``A1``: valid on this report's pages only; `key` is stable."""
     key: str
     sort: Sort
     says: str
-    """Plain words from the plan; empty where nobody has found any yet."""
+    """Plain words from the plan; empty if none have been written yet."""
     text: str
-    """All of it, as the plan or the method has it."""
+    """The full text, as in the plan or the method's record."""
     because: str
     who: str
     until: str
     expired: bool
     needed_by: tuple[str, ...]
-    """Requirements; empty where only guarantees need it that no requirement rests on."""
+    """Requirements; empty if only guarantees need it on which no requirement rests."""
     where: tuple[str, ...]
-    """Places of the plan, or claims whose evidence says it."""
+    """Places in the plan, or claims whose evidence states it."""
     date: str = field(default="", metadata=LATER)
-    """The day on which it was supposed (the latest, where it was said more than once); empty: no day is named."""
+    """The day on which the assumption was made (the latest, if it was made more than once); empty if no day is
+    named."""
 
     @property
     def owned(self) -> bool:
-        """Whether somebody keeps it true, and until when."""
+        """Whether a person is responsible for it, until a named day."""
         return bool(self.who and (self.until or self.sort is Sort.MEANING))  # a validation ends when a text changes
 
     @property
@@ -134,14 +135,14 @@ class Assumption:
 
     @property
     def term(self) -> str:
-        """``A. Person, 2026-11-21, until 2030-12-31``: who keeps it true, since when, until when."""
+        """``A. Person, 2026-11-21, until 2030-12-31``: who is responsible for it, since when, until when."""
         ended = "expired" if self.expired else "until"
         parts = (self.who or "no owner", self.date, f"{ended} {self.until}" if self.until else "no last day")
         return ", ".join(part for part in parts if part)
 
     @property
     def words(self) -> str:
-        """Plain words, or where to write them."""
+        """The plain words, or a note where to write them."""
         if self.says:
             return self.says
         section, _, rest = self.key.partition(".")
@@ -156,17 +157,17 @@ class Assumption:
 
     @property
     def needing(self) -> tuple[str, ...]:
-        """Whose assumption it is, for the column *needed by*."""
+        """The requirements that need it, for the column *needed by*."""
         return self.needed_by or ("guarantees only",)
 
 
 EARLIER = "As of an earlier state"
-"""Before the title of a case whose system cannot be read as it stands now, or is gone."""
+"""The prefix of the title of a case whose system cannot be read now, or is gone."""
 
 
 @dataclass(frozen=True, slots=True)
 class Deficit:
-    """One kind of reason for which the case says less than it seems to. `why` says what a reader should make of it."""
+    """One kind of reason for which the case says less than it seems to. `why` explains its meaning for the reader."""
 
     key: str
     count: int
@@ -177,31 +178,31 @@ class Deficit:
 
 @dataclass(frozen=True, slots=True)
 class WeakestEvidence:
-    """The least evidence under a requirement, or under the whole case: evidence only, no reasons."""
+    """The weakest evidence under a requirement, or under the whole case: evidence only, no reasons."""
 
     claim: str
     node: str
     title: str
-    """What people call the node."""
+    """The node's name for readers."""
     status: str
-    """``tested``, ``observed``…: the words of a page, not of the ledger."""
+    """``tested``, ``observed``…: the terms of a page, not of the ledger."""
     quote: str
     """The guarantee in English."""
     words: str
-    """What was seen, with its bound, as a sentence without its full stop."""
+    """What was observed, with its bound, as a sentence without its full stop."""
     needed_by: tuple[str, ...] = ()
     beside: int = field(default=0, metadata=LATER)
-    """So many requirements have their weakest evidence in another guarantee of the same node."""
+    """The number of requirements whose weakest evidence is in another guarantee of the same node."""
 
     @property
     def others(self) -> str:
-        """After the requirements that need it: why more of them name the same node."""
+        """The text after the requirements that need it: why more of them name the same node."""
         return f"; {self.beside} on other guarantees of this node" if self.beside else ""
 
 
 @dataclass(frozen=True, slots=True)
 class NodeBasis:
-    """On what a node's guarantees stand: a letter and a colour each, and the same counted in words."""
+    """The evidence behind a node's guarantees: a letter and a colour each, and counts in words."""
 
     node: str
     title: str
@@ -211,7 +212,7 @@ class NodeBasis:
 
 @dataclass(frozen=True, slots=True)
 class SupposedLine:
-    """One line for all assumptions of a sort: how many, and the most needed."""
+    """One line for all assumptions of a sort: their number, and the most needed one."""
 
     sort: Sort
     count: int
@@ -227,12 +228,12 @@ class SupposedLine:
 
     @property
     def more(self) -> str:
-        """``also A2 to A6``: where the others of the sort are; empty where there is no other."""
+        """``also A2 to A6``: the numbers of the others of the sort; empty if there are none."""
         return f"also {', '.join(_ranges(self.others))}" if self.others else ""
 
 
 def _ranges(numbers: Sequence[str]) -> Iterator[str]:
-    """``A1``, ``A3 to A6``: three or more that follow one another as their ends."""
+    """``A1``, ``A3 to A6``: three or more consecutive numbers are written as a range."""
     at = 0
     while at < len(numbers):
         end = at
@@ -244,7 +245,7 @@ def _ranges(numbers: Sequence[str]) -> Iterator[str]:
 
 @dataclass(frozen=True, slots=True)
 class Baseline:
-    """What was signed, as far as a later case is compared with it."""
+    """The part of a signed case that later cases are compared with."""
 
     name: str
     """The file, relative to the workspace."""
@@ -276,7 +277,7 @@ class ChangeLine:
     before: str = ""
     after: str = ""
     edits: tuple[str, ...] = field(default=(), metadata=LATER)
-    """Of a requirement: what changed beneath it."""
+    """For a requirement: the changes below it."""
 
     @property
     def worse(self) -> bool:
@@ -285,28 +286,29 @@ class ChangeLine:
 
 @dataclass(frozen=True, slots=True)
 class Changes:
-    """What changed since the last signed report. `against` names it; empty: none has been signed."""
+    """What changed since the last signed report. `against` names that report; empty: none has been signed."""
 
     against: str
     entries: tuple[ChangeLine, ...] = ()
     again: int = 0
-    """So many guarantees were re-run with the same answer."""
+    """The number of guarantees that were re-run with the same answer."""
 
 
 @dataclass(frozen=True, slots=True)
 class TrustLine:
-    """A part of what has to be trusted: what it is, which one, and what was done about it."""
+    """A part that has to be trusted: what it is, which one, and the mitigation."""
 
     what: str
     which: str
     mitigation: str
     partly: bool = field(default=False, metadata=LATER)
-    """Whether that was not done, or not for all of it."""
+    """Whether the mitigation is missing, or does not cover all of it."""
 
 
 @dataclass(frozen=True, slots=True)
 class Failure:
-    """A gate that fails, for the banner: its title, why, and the next step; empty where there is none to suggest."""
+    """A gate that fails, for the banner: its title, the reason, and the next step; empty if there is none to
+    suggest."""
 
     title: str
     reason: str
@@ -319,7 +321,7 @@ class Answers:
 
     headline: Level
     verdict: str
-    """The headline with what bounds it: ``Shown by tests (failure rate: at most 6.2 % …)``."""
+    """The headline with its bound: ``Shown by tests (failure rate: at most 6.2 % …)``."""
     tone: Tone
     by_level: tuple[tuple[Level, int], ...]
     counts: str
@@ -329,46 +331,46 @@ class Answers:
     """The requirements that have a row of their own: all of them, or the worst."""
     based_on: tuple[NodeBasis, ...]
     bases: tuple[NodeBasis, ...]
-    """Of every node, by name."""
+    """The basis of every node, by name."""
     more_nodes: str
     weakest: WeakestEvidence | None
     next_weakest: str
     refuted: str
-    """What is refuted, in place of the weakest evidence; empty where nothing is."""
+    """The refutation, in place of the weakest evidence; empty if nothing is refuted."""
     supposed: tuple[SupposedLine, ...]
     owned: str
     changed_against: str
     changed: tuple[tuple[str, str], ...]
     """(mark, sentence), five at most."""
     signed: str
-    """``not signed``, or by whom and whether the case is still that one."""
+    """``not signed``, or the signer and whether the case is still the signed one."""
     statement: str
-    """What a signature says."""
+    """The statement that a signer makes."""
     warned: str = field(default="", metadata=LATER)
-    """``WARNED: 13 findings known``, beside the verdict; empty where nothing is known to be bad."""
+    """``WARNED: 13 findings known``, beside the verdict; empty if nothing is known to be bad."""
     owners: str = field(default="", metadata=LATER)
-    """Who answers for the assumptions, and until when; empty where nobody does."""
+    """The owners of the assumptions, and the day on which the first one ends; empty if there are none."""
     weakened_by: str = field(default="", metadata=LATER)
-    """Which the ways are in which the case is weakened; empty where there is none."""
+    """The ways in which the case is weakened; empty if there are none."""
 
     trusted: tuple[TrustLine, ...] = field(default=(), metadata=LATER)
-    """What has to be trusted."""
+    """The parts that have to be trusted."""
     failures: tuple[Failure, ...] = field(default=(), metadata=LATER)
     """The gates that fail, in the order of the gates."""
     objects: str = field(default="", metadata=LATER)
-    """What the words mean that say what was looked at: *model*, *source*…"""
+    """The meaning of the words that name the examined object: *model*, *source*…"""
 
     @property
     def legend(self) -> str:
-        """What the words in the column *how it stands* mean, of those that are used."""
+        """The meaning of the words in the column *how it stands*, for those that are used."""
         return "; ".join(f"{level}: {MEANINGS[level]}" for level, _ in self.by_level)
 
     @property
     def beside(self) -> str:
-        """What stands beside the verdict in every format."""
+        """The text beside the verdict in every format."""
         return " · ".join(part for part in (self.warned, self.counts, self.weakened, self.gates) if part)
 
     @property
     def told(self) -> str:
-        """The verdict where nothing stands beside it."""
+        """The verdict with its warning, for use without the text beside it."""
         return f"{self.verdict} ({self.warned})" if self.warned else self.verdict

@@ -1,7 +1,7 @@
-"""What the case rests on without its being shown: each assumption once, in plain words, with owner and date.
+"""The assumptions of the case: each once, in plain words, with owner and date.
 
-That is what a requirement needs, and what the evidence of any other guarantee supposes: a page that names the evidence
-names what that supposes.
+They are those that a requirement needs, and those of the evidence for any other guarantee: a page that shows evidence
+also shows its assumptions.
 """
 
 from __future__ import annotations
@@ -29,29 +29,29 @@ from avow.system.statements import GENERAL
 
 _SORTS = tuple(Sort)
 _SCENARIO = Statement("assumptions.compose.scenario", "Nothing occurs that the plan's finite scenario does not list")
-"""The bounds of a check within the scenario, each named by its record, are one assumption."""
+"""The limits of checks within the scenario, each named by its record, are one assumption."""
 _WHOLE = ""
-"""Stands among the requirements for all guarantees together."""
+"""The key, among the requirements, for all guarantees together."""
 _MEANING = "Each requirement's formula, or the guarantees named, says what its sentence asks for"
 _PLATFORM = ("persistence", "one-output", "entered")
 
 
 @dataclass(frozen=True, slots=True)
 class Statements:
-    """The plan's plain words, found by the place that they are about or by what a method supposes."""
+    """The plan's plain words, found by the place that they are about or by a method's assumption."""
 
     all: tuple[Statement, ...]
     today: date
 
     def at(self, place: str, because: str = "") -> Statement:
-        """What is said of a place; else what is said with the same reason; else nothing, in no words."""
+        """The statement about a place; else a statement with the same reason; else an empty statement."""
         found = next((s for s in self.all if s.place == place), None)
         if found is None and because:
             found = next((s for s in self.all if s.because == because), None)
         return found or Statement(place)
 
     def of_method(self, method: str, hypothesis: str) -> Statement:
-        """The statement ``assumptions.<method>.<word>`` whose word the hypothesis has."""
+        """The statement ``assumptions.<method>.<word>`` whose word occurs in the hypothesis."""
         told = hypothesis.casefold()
         for statement in self.all:
             section, _, rest = statement.place.partition(".")
@@ -72,18 +72,18 @@ class Statements:
 
 
 def _spelled(name: str) -> tuple[str, ...]:
-    """A key's word as it may stand in a hypothesis."""
+    """The spellings of a key's word that a hypothesis may use."""
     return tuple({name.casefold(), name.replace("_", " ").casefold(), name.replace("-", " ").casefold()})
 
 
 def _says(told: str, word: str) -> bool:
-    """Whether a text has a word, whole: one of three letters at least, so that no key is about everything."""
+    """Whether a text contains a whole word of at least three letters, so that no key matches everything."""
     return len(word) > 2 and re.search(rf"(?<!\w){re.escape(word)}(?!\w)", told) is not None
 
 
 @dataclass(frozen=True, slots=True)
 class _Raw:
-    """One thing supposed at one place."""
+    """One assumption at one place."""
 
     sort: Sort
     place: str
@@ -102,8 +102,8 @@ def assumptions(
     whole: Closed,
     statements: Statements,
 ) -> tuple[Assumption, ...]:
-    """Those that some requirement needs (`required`: what each rests on), or some guarantee (`whole`: what they all
-    rest on), numbered: by what they are about, the most needed first."""
+    """The assumptions that some requirement needs (`required`: what each rests on), or some guarantee (`whole`: what
+    they all rest on), numbered in order of sort, the most needed first."""
     closed = {**required, _WHOLE: whole}
     raw = [
         *_reasons(views, closed, statements),
@@ -154,7 +154,7 @@ def _in(closed: Mapping[str, Closed], claim: str) -> Callable[[str], bool]:
 
 
 def _reasons(views: Sequence[ObligationView], closed: Mapping[str, Closed], statements: Statements) -> Iterator[_Raw]:
-    """Conditions of the composition, and guarantees, for which the plan gives a reason and nothing else."""
+    """Conditions of the composition, and guarantees, that only a reason in the plan supports."""
     for view in views:
         if view.status is not Status.JUSTIFIED:
             continue
@@ -175,12 +175,12 @@ def _of_methods(
     closed: Mapping[str, Closed],
     statements: Statements,
 ) -> Iterator[_Raw]:
-    """Hypotheses of the records relied upon."""
+    """Hypotheses of the records that are relied upon."""
     for view in views:
         if view.id not in relied:
             continue
         found = relied[view.id]
-        # what is supposed of how a program is run, or of its likeness to a model, is not about the cases
+        # assumptions about how a program is run, or about its likeness to a model, are not about the sampled cases
         sampled = found.status in (Status.TESTED, Status.MONITORED) and view.obligation.kind is not Kind.PROGRAM
         for text in found.assumptions:
             statement = statements.of_method(found.record.method, text)
@@ -192,7 +192,7 @@ def _of_methods(
 
 
 def _accepted(facts: Facts, views: Sequence[ObligationView], closed: Mapping[str, Closed]) -> Iterator[_Raw]:
-    """What a record rests on and a person has accepted by name."""
+    """Hypotheses of records that a person has accepted by name."""
     supposed = {
         assumption_claim(h): h
         for view in views
@@ -227,21 +227,21 @@ def _of_evidence(
     closed: Mapping[str, Closed],
     statements: Statements,
 ) -> Iterator[_Raw]:
-    """What no record says of itself: that what runs does what its model does, that untried cases are like those tried,
-    that the platform does what is expected of it, and that the tools answer rightly."""
+    """The assumptions that no record states: that the program behaves like its model, that untried cases are like those
+    tried, that the platform behaves as expected, and that the tools answer correctly."""
     for view in views:
         if view.id not in relied or view.obligation.kind is not Kind.GUARANTEE:
             continue
         found, name = relied[view.id], short(view.id)
         record = found.record
-        if looked_at(found) is None:  # a person's word
+        if looked_at(found) is None:  # a person's statement
             continue
         about = [(Sort.PLATFORM, PLATFORM, ""), (Sort.TOOLS, TOOLS, record.tool or record.backend)]
         if record.of is Object.MODEL:
             about.append((Sort.MODELS, MODELS, f"{name} by {record.method}"))
         if found.status in (Status.TESTED, Status.MONITORED):
             about.append((Sort.SAMPLING, SAMPLES, f"{name}: {seen(found)}"))
-        if record.of is Object.RECORDING:  # a monitor or an experiment does not look at the program
+        if record.of is Object.RECORDING:  # a monitor or an experiment does not examine the program
             about.append((Sort.SAMPLING, RECORDINGS, f"{name} by {record.method}"))
         for sort, place, text in about:
             said = statements.at(place)
@@ -253,7 +253,7 @@ def _first_values(
     views: Sequence[ObligationView], closed: Mapping[str, Closed], statements: Statements
 ) -> Iterator[_Raw]:
     """The `initial` values of delayed connections that a proof uses: the calculus takes them from the plan, and no
-    method looks at what a program begins with, but for what the node's own class keeps itself."""
+    method checks a program's first values, except those that the node's own class keeps."""
     for view in views:
         labels = [label for record in view.records for label in used(record.details) if _is_first_value(label)]
         if labels and view.status.supports:
@@ -264,13 +264,13 @@ def _first_values(
 
 
 def _is_first_value(label: str) -> bool:
-    """Whether a hypothesis is the plan's `initial`, and not what a clause remembers before the first step."""
+    """Whether a hypothesis is the plan's `initial`, and not a clause's state variable before the first step."""
     return label.startswith("initial ") and CELL not in label
 
 
 def _meaning(requirements: Sequence[Requirement], statements: Statements) -> Iterator[_Raw]:
-    """That a requirement's formula, or the guarantees named under a sentence without one, say what the sentence asks
-    for: the word of the person who validated it."""
+    """The assumption that a requirement's formula, or the guarantees named under a sentence without one, mean what the
+    sentence says: the statement of the person who validated it."""
     for r in requirements:
         place = f"requirements.{r.id}.validation"
         said = statements.at(place)

@@ -6,11 +6,11 @@ The pipeline calls, once a system:
     facts = facts_of_system(
         system,
         obligations,                       # every Obligation of the system, of every kind
-        ledger.records(),                  # every Entry, oldest first; current, stale and superseded alike. What the
-                                           # case keeps of them: `avow.assurance.history`
+        ledger.records(),                  # every Entry, oldest first; current, stale and superseded alike. The
+                                           # case keeps some of them: `avow.assurance.history`
         keys={(obligation.id, method_id): key},   # one item for each attempt that the plan asks for NOW; `key` as
-                                           # computed afresh. No item: no method is planned (missing, or withdrawn).
-        today=date,                        # handed in: nothing here reads a clock
+                                           # computed now. No item: no method is planned (missing, or withdrawn).
+        today=date,                        # passed in: nothing here reads a clock
         run=RunInfo(...),
         derivations=(Derivation(...), …),  # what the calculus derived (view dataclass in avow.assurance.model)
         methods=(MethodInfo(...), …),      # the backends known: for suggestions and for "what green means"
@@ -20,14 +20,14 @@ The pipeline calls, once a system:
         digests={"contracts/x/plan.yaml": sha256, …},
         ledger_head=ledger.head,
         graph_svg="<svg…>",
-        sources={"contracts/x/system.rcl": "the text…"},  # what `digests` are the digests of
+        sources={"contracts/x/system.rcl": "the text…"},  # the texts behind `digests`
     )
     case = conclude(facts)
     render_all(case, workspace.report(system.name))
     exit code: case.exit_code
 
 Raises `Rejected` for a policy that cannot be used (call `avow.assurance.policy.read_policy(plan.policy)` when the plan
-is loaded, so that this comes early).
+is loaded, so that this is raised early).
 """
 
 from __future__ import annotations
@@ -86,12 +86,12 @@ from avow.evidence.status import Status, behind, best_link, effective, roll_up, 
 
 
 def conclude_again(case: Case) -> Case:
-    """The case that follows from what a case holds: equal to it, unless somebody changed its conclusions."""
+    """The case that follows from a case's facts: equal to it, unless its conclusions were edited."""
     return conclude(facts_of_case(case))
 
 
 def as_of_earlier(case: Case) -> Case:
-    """A case whose system cannot be read as it stands now: the same facts, and a gate that fails for it."""
+    """A case whose system cannot be read now: the same facts, and a gate that fails for this reason."""
     return conclude(replace(facts_of_case(case), earlier=True))
 
 
@@ -236,8 +236,8 @@ def conclude(facts: Facts) -> Case:
 
 
 def _evidence(facts: Facts) -> tuple[dict[str, tuple[EvidenceView, ...]], tuple[Entry, ...]]:
-    """Each obligation's records with where they stand in time, and the records that belong to no obligation: in an
-    order that does not hang on which method answered first."""
+    """Each obligation's records with their currency, and the records that belong to no obligation, in an order that
+    does not depend on which method answered first."""
     grouped: dict[str, list[Entry]] = {o.id: [] for o in facts.obligations}
     orphans = []
     for entry in facts.entries:
@@ -254,7 +254,7 @@ def _evidence(facts: Facts) -> tuple[dict[str, tuple[EvidenceView, ...]], tuple[
 
 
 def _in_order(views: list[EvidenceView]) -> tuple[EvidenceView, ...]:
-    """Run by run, and in each by method: which of several methods answered first is chance."""
+    """Sorted by run, and within a run by method: which of several methods answered first is chance."""
     if len(views) == 1:  # nearly always
         return tuple(views)
     runs = {run: at for at, run in enumerate(dict.fromkeys(v.entry.evidence.run for v in views))}
@@ -264,10 +264,10 @@ def _in_order(views: list[EvidenceView]) -> tuple[EvidenceView, ...]:
 def _views(
     entries: list[Entry], digest: str, planned: Mapping[str, str], run: RunInfo, today: date
 ) -> list[EvidenceView]:
-    """Where each record stands in time. All answers to today's question count, so that none hides a refutation; but of
-    several that say the same only the newest, and none that failed to answer where the same method did answer: leaving
-    these out cannot change the status. What a method says in support is not believed where its newest score of mutants
-    shows that it would say so of anything."""
+    """The currency of each record. All answers to today's question count, so that none hides a refutation; but of
+    several with the same result only the newest counts, and a failed attempt does not count if the same method also
+    answered: leaving these out cannot change the status. A method's support does not count if its newest mutation score
+    shows that it is non-discriminating."""
 
     def currency(entry: Entry) -> Currency:
         record = entry.evidence
@@ -282,7 +282,7 @@ def _views(
         return Currency.CURRENT
 
     standing = [currency(entry) for entry in entries]
-    if len(entries) == 1:  # nothing else speaks: nearly always
+    if len(entries) == 1:  # no other record to compare with: nearly always
         return [_view(entries[0], standing[0])]
     scored = {
         e.evidence.method: e.evidence
@@ -319,7 +319,7 @@ def _failed(entry: Entry) -> bool:
 
 
 def _has_expired(record: Evidence, today: date) -> bool:
-    """Whether support was given until a day that is past, or that cannot be read. A refutation does not expire."""
+    """Whether support was given until a day that has passed, or that cannot be read. A refutation does not expire."""
     until = record.details.get("valid_until")
     if until is None or weigh(record).support is None:
         return False
@@ -330,7 +330,7 @@ def _has_expired(record: Evidence, today: date) -> bool:
 
 
 def _is_hollow(record: Evidence) -> bool:
-    """Whether it is a score that says that the method notices no mutant."""
+    """Whether it is a mutation score of a non-discriminating method, which kills no mutant."""
     return record.vacuous and "mutation" in record.details and record.verdict.supports
 
 
@@ -398,7 +398,7 @@ def _grade(facts: Facts, proofs: Sequence[ProofView]) -> tuple[Grade, str]:
 
 
 def _fresh(facts: Facts, views: Sequence[ObligationView]) -> tuple[bool, str]:
-    """Whether nothing was believed that this run did not compute, and every digest was verified."""
+    """Whether this run computed everything that was used, and every digest was verified."""
     if facts.discrepancies is None:
         return False, "digests were not verified in this run"
     serious = sum(d.serious for d in facts.discrepancies)
@@ -426,12 +426,12 @@ def _fresh(facts: Facts, views: Sequence[ObligationView]) -> tuple[bool, str]:
 def shown_by_programs(
     obligations: Sequence[Obligation], statuses: Mapping[str, Status], counting: Mapping[str, Sequence[Entry]]
 ) -> dict[str, tuple[Status, str]]:
-    """Obligation → its status and, in words, which method's proofs give it.
+    """Obligation → its status and, in words, the method whose proofs give it.
 
     A program that is proved to meet every guarantee for all allowed inputs, and to have an output for each, is itself
-    the witness that its node's contract is realizable, and so consistent. It counts where the analysis of the contract
-    alone gave no answer, and only while its records are current; where the analysis says the opposite, one of the tools
-    is wrong.
+    the witness that its node's contract is realizable, and so consistent. It counts if the analysis of the contract
+    alone gave no answer, and only while its records are current; if the analysis gave the opposite answer, one of the
+    tools is wrong.
     """
     proofs: dict[str, list[set[str]]] = {}
     for o in obligations:

@@ -1,6 +1,7 @@
-"""Whose word each `proved` is: the kernel's, of this very run, or another's. And all that has to be trusted for it.
+"""The grade of each `proved`: established by the kernel in this very run, or by another tool; and everything that has
+to be trusted for it.
 
-No record of the ledger gives a grade: the pipeline hands in what the kernel established again (`KernelRun`).
+No record of the ledger gives a grade: the pipeline passes in what the kernel re-established (`KernelRun`).
 """
 
 from __future__ import annotations
@@ -27,28 +28,28 @@ _CERTIFIABLE = (Kind.COMPOSITION, Kind.REQUIREMENT)
 
 class ProofGrade(StrEnum):
     CERTIFIED_2 = "certified-2"
-    """Established by the kernel in this run; two solvers, of different makers, answered each of its questions."""
+    """Established by the kernel in this run; two solvers, of different makers, answered each of its queries."""
     CERTIFIED_1 = "certified-1"
     """Established by the kernel in this run, with Z3."""
     CLAIMED = "claimed"
-    """The calculus says so, and the kernel did not establish it in this run."""
+    """The calculus reported it, and the kernel did not establish it in this run."""
     TOOL_TRUSTED = "tool-trusted"
-    """The word of another engine: its tools have to be trusted."""
+    """Reported by another engine: its tools have to be trusted."""
 
 
 @dataclass(frozen=True, slots=True)
 class KernelRun:
-    """What the kernel did in a run."""
+    """The kernel's results in a run."""
 
     run: str = ""
-    """The run's id; empty: the kernel was not asked."""
+    """The run's id; empty: the kernel did not run."""
     established: tuple[Reestablished, ...] = ()
     solvers: Mapping[str, str] = field(default_factory=dict)
     """Name → version."""
     certificates: Mapping[str, Any] = field(default_factory=dict)
     """Scope → certificate (``avow/certificate/1``)."""
     parts: tuple[tuple[str, str], ...] = ()
-    """What of Avow has to be trusted: name, and SHA-256 or version."""
+    """The parts of Avow that have to be trusted: name, and SHA-256 or version."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,9 +59,9 @@ class ProofView:
     obligation: str
     grade: ProofGrade
     tools: tuple[str, ...] = ()
-    """Whose word it is, with versions, where it is no certificate."""
+    """The tools that reported it, with versions, if it has no certificate."""
     key: str = ""
-    """The kernel's, of what it was established from."""
+    """The kernel's key of the input that it was established from."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,8 +73,8 @@ class Trusted:
 
 
 def proof_views(views: Iterable[ObligationView], kernel: KernelRun, run: str) -> tuple[ProofView, ...]:
-    """Every `proved` of the case with its grade, but for that of parser and type checker (they are trusted). What the
-    kernel said in another run than this one gives none."""
+    """Every `proved` of the case with its grade, except those of parser and type checker (they are trusted). Results of
+    the kernel in another run give no grade."""
     known = {one.obligation: one for one in kernel.established if kernel.run == run}
     return tuple(
         _graded(view, known.get(view.id))
@@ -98,17 +99,17 @@ def _graded(view: ObligationView, known: Reestablished | None) -> ProofView:
 
 
 def certifiable(proofs: Iterable[ProofView]) -> tuple[ProofView, ...]:
-    """The proofs that a certificate is wanted for: those of the calculus and of requirements."""
+    """The proofs that should have a certificate: those of the calculus and of requirements."""
     return tuple(p for p in proofs if p.obligation.split("/")[2] in _CERTIFIABLE)
 
 
 def claimed(proofs: Iterable[ProofView]) -> tuple[str, ...]:
-    """What is proved by the calculus' word alone."""
+    """The claims proved by the calculus without a certificate."""
     return tuple(p.obligation for p in proofs if p.grade is ProofGrade.CLAIMED)
 
 
 def standing(proofs: Sequence[ProofView], kernel: KernelRun, run: str) -> tuple[bool, str]:
-    """Whether every proof of the calculus and of a requirement was established again in the run, and why not."""
+    """Whether every proof of the calculus and of a requirement was re-established in the run, and if not, why."""
     wanted = certifiable(proofs)
     if not wanted:
         return False, "nothing of the composition or of the requirements is proved: there is nothing to certify"
@@ -127,7 +128,7 @@ def standing(proofs: Sequence[ProofView], kernel: KernelRun, run: str) -> tuple[
 
 
 def trusted_base(proofs: Iterable[ProofView], kernel: KernelRun) -> tuple[Trusted, ...]:
-    """All that has to be trusted for what is proved, beside the reasons that persons give."""
+    """Everything that has to be trusted for the proofs, besides the reasons that persons give."""
     own = [Trusted(what, which) for what, which in kernel.parts]
     solvers = [Trusted(f"solver {name}", version) for name, version in sorted(kernel.solvers.items())]
     tools: dict[str, int] = {}

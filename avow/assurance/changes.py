@@ -1,4 +1,4 @@
-"""What changed since the last signed report: what of a case a signature covers, and the comparison with it."""
+"""Changes since the last signed report: the part of a case that a signature covers, and the comparison with it."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _PASSING = ("believed",)
 
 
 def baseline_of(case: Case, name: str = "", who: str = "", signed_on: str = "", until: str = "") -> Baseline:
-    """What of a case is signed, and compared with later ones."""
+    """The part of a case that is signed, and compared with later cases."""
     found = Baseline(
         name=name,
         who=who,
@@ -40,7 +40,7 @@ def baseline_of(case: Case, name: str = "", who: str = "", signed_on: str = "", 
 
 
 def content_of(of: Baseline) -> str:
-    """SHA-256 of all that a signature speaks of: verdict, requirements, evidence, assumptions, deficits."""
+    """SHA-256 of everything that a signature covers: verdict, requirements, evidence, assumptions, deficits."""
     return sha256(
         canonical(
             {
@@ -61,7 +61,7 @@ def changes(
     assumptions: Sequence[Assumption],
     deficits: Sequence[Deficit],
 ) -> Changes:
-    """What is otherwise than in the signed report, worst first."""
+    """The differences from the signed report, worst first."""
     if old is None:
         return Changes("")
     guarantees = [view for view in views if view.obligation.kind is Kind.GUARANTEE]
@@ -73,7 +73,7 @@ def changes(
     shown = [replace(e, edits=tuple(under.get(e.subject, ()))) for e in _requirements(old, requirements)] + below
     lost = any(entry.kind in ("open", "gone", "weaker") for entry in shown)
     entries = [*shown, *_assumptions(old, assumptions), *_deficits(old, deficits)]
-    if lost:  # what less is claimed also supposes less, and has less to be weakened: that is no gain
+    if lost:  # a smaller claim also has fewer assumptions and deficits: that is no gain
         entries = [e for e in entries if e.kind != "better" or e in shown]
     again = sum(
         1 for name in now if name in then and now[name][1:3] == then[name][1:3] and now[name][4] != then[name][4]

@@ -1,8 +1,8 @@
-"""All that a requirement rests on, closed under what its parts rest on themselves.
+"""Everything that a requirement rests on, closed under what its parts rest on.
 
-A guarantee brings what discharges its node's assumptions; a side condition, what its proof used; two nodes or more,
-that values persist and that each input gives at most one output. So a requirement in prose never looks stronger than
-one that is derived through the same nodes.
+A guarantee adds the claims that discharge its node's assumptions; a side condition adds those that its proof used; two
+nodes or more add that values persist and that each input gives at most one output. So a requirement in prose never
+looks stronger than one that is derived through the same nodes.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ _TOGETHER = (".persistence", ".one-output")
 
 @dataclass(frozen=True, slots=True)
 class Closed:
-    """`claims` are obligations' ids, sorted, and `accepted` what persons accept; `failing` those of them that do not
-    hold; `assumptions` those of nodes (``node.clause``) that nothing in the case discharges."""
+    """`claims` are obligations' ids, sorted, and `accepted` the assumptions that persons accept; `failing` those of
+    both that do not hold; `assumptions` those of nodes (``node.clause``) that nothing in the case discharges."""
 
     claims: tuple[str, ...]
     accepted: tuple[str, ...]
@@ -30,7 +30,7 @@ class Closed:
 
 
 class Closure:
-    """Who rests on whom, with what claims do not say of themselves."""
+    """The dependencies between claims, including those that claims do not list themselves."""
 
     def __init__(
         self,
@@ -93,7 +93,7 @@ class Closure:
         return seen, lost
 
     def _further(self, view: ObligationView) -> tuple[tuple[str, ...], tuple[str, ...]]:
-        """What a claim rests on beyond what it says, and assumptions that nothing discharges."""
+        """The claims that a claim rests on beyond those it lists, and the assumptions that nothing discharges."""
         if _guarantees(view):
             node, about = view.obligation.node, f"{view.obligation.node}.{view.obligation.name}"
             assumed = [f"{node}.{clause}" for clause in self.assumptions.get(node, ())]
@@ -118,8 +118,8 @@ class Closure:
         return tuple(dict.fromkeys(found)), tuple(lost)
 
     def _by(self, about: str) -> tuple[str, ...]:
-        """What discharges an assumption: in the whole system, if anything is known of that; else one way that holds,
-        or all that were tried."""
+        """The claims that discharge an assumption: in the whole system, if there are any; else one way that holds, or
+        all that were tried."""
         whole = self.local.get(f"system/{Kind.COMPOSITION}/whole.{about}")
         outside = self.local.get(f"system/{Kind.COMPOSITION}/environment.{about}")
         loops = [v.id for v in self.composition if ".loop." in v.obligation.name and about in v.obligation.clauses]
@@ -144,7 +144,8 @@ class Closure:
         return clause in self.assumptions.get(node, ())
 
     def _together(self) -> Iterator[str]:
-        """What makes values of several nodes belong to one step: said for the whole system, else wherever it is."""
+        """The conditions under which values of several nodes belong to one step: the whole system's, if it has any,
+        else all."""
         spoken = [view for view in self.composition if view.obligation.name.endswith(_TOGETHER)]
         whole = [view for view in spoken if view.obligation.name.startswith("whole.")]
         yield from (view.id for view in whole or spoken)

@@ -1,4 +1,4 @@
-"""Cases as JSON, there and back, and their published schema (`avow.base.codec`)."""
+"""Cases as JSON, both directions, and their published schema (`avow.base.codec`)."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from avow.base.files import read_regular
 from avow.evidence.ledger import Line
 
 SCHEMA = "https://avow.invalid/schemas/case-5"
-"""Names the format in ``report.json``; raised when it changes incompatibly."""
+"""The format's name in ``report.json``; its number increases with incompatible changes."""
 
 
 def to_json(case: Case) -> dict[str, Any]:
@@ -22,7 +22,7 @@ def to_json(case: Case) -> dict[str, Any]:
 
 
 def from_json(data: object) -> Case:
-    """The case that plain data stands for. Raises Unreadable."""
+    """The case that plain data represents. Raises Unreadable."""
     if not isinstance(data, dict) or data.get("schema") != SCHEMA:
         raise Unreadable(f"not a case of format {SCHEMA}")
     return codec.from_json(Case, {key: value for key, value in data.items() if key != "schema"})

@@ -1,4 +1,4 @@
-"""What changed between two cases: requirements with the edits behind each, claims, gates; why, from the evidence."""
+"""The changes between two cases: requirements with the edits behind each, claims, gates; reasons from the evidence."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from avow.evidence.status import Status, effective, roll_up
 from avow.system.statements import GENERAL
 
 ORDER = ("requirement", "gate", "worse", "removed", "assumption", "meaning", "added", "better", "rerun")
-"""Kinds of changes, what a reader must know first."""
+"""Kinds of changes, the most important first."""
 
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """The newest record of one method that counts for a claim; `gone` says why it does not any more, if so."""
+    """The newest record of one method that counts for a claim; `gone` says why it no longer counts, if so."""
 
     record: Evidence
     mark: str
@@ -34,7 +34,7 @@ class Answer:
 
 @dataclass(frozen=True, slots=True)
 class Told:
-    """What is known of a claim beyond where it stands."""
+    """The known facts about a claim besides its status."""
 
     title: str = ""
     answers: Mapping[str, Answer] = field(default_factory=dict)
@@ -47,7 +47,7 @@ class Told:
 
 @dataclass(frozen=True, slots=True)
 class Required:
-    """A requirement: how far it is shown, and every claim under it."""
+    """A requirement: how far it is shown, and every claim below it."""
 
     words: str
     level: Level
@@ -59,21 +59,22 @@ class Required:
 
 @dataclass(frozen=True, slots=True)
 class Snapshot:
-    """What can be compared: claim → (digest of its meaning, status). Requirements and gates where there are any."""
+    """The comparable part of a case: claim → (digest of its meaning, status). Requirements and gates if there are
+    any."""
 
     name: str
     claims: Mapping[str, tuple[str, Status]]
     gates: Mapping[str, bool]
     told: Mapping[str, Told] = field(default_factory=dict)
     reasons: Mapping[str, str] = field(default_factory=dict)
-    """Gate → why it fails or passes."""
+    """Gate → the reason why it fails or passes."""
     assumptions: Mapping[str, str] | None = None
-    """Key → words; None where nothing is known of them (a bare ledger)."""
+    """Key → words; None if nothing is known of them (a bare ledger)."""
     requirements: Mapping[str, Required] = field(default_factory=dict)
     sources: Mapping[str, str] = field(default_factory=dict)
     """Contracts and plan: path → text."""
     signed: bool = False
-    """Whether it is what a signature covers: of the claims only guarantees, and no answer of a method."""
+    """Whether it is the content of a signature: only guarantees among the claims, and no method's answers."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,12 +88,12 @@ class Change:
     title: str = ""
     why: tuple[str, ...] = ()
     old_formula: str = ""
-    """Where the meaning changed: what it was, and what it is."""
+    """If the meaning changed: the old and the new formula."""
     new_formula: str = ""
 
     @property
     def is_worse(self) -> bool:
-        """Whether less is shown than before, or more supposed."""
+        """Whether less is shown than before, or more is assumed."""
         if self.kind == "gate":
             return self.after == "fails"
         if self.kind == "requirement":
@@ -119,12 +120,12 @@ class Change:
                 return f"gate {self.subject}: {self.before} → {self.after}"
             case "rerun":
                 return f"re-run: {self.subject} (still {self.after})"
-            case _:  # worse and better are told the same way
+            case _:  # worse and better have the same form
                 return f"{self.kind}: {self.subject}: {self.before} → {self.after}"
 
 
 _OF_RUN = ("integrity", "derivations", "proved", "certified")
-"""Gates that ask what a run found out: a case that is concluded without one has no answer."""
+"""Gates about a run's findings: a case that is concluded without a run cannot answer them."""
 _RANK: Mapping[str, int] = {level: at for at, level in enumerate(Level)}
 
 
@@ -143,7 +144,7 @@ def of_case(case: Case) -> Snapshot:
 
 
 def of_signature(name: str, signed: Baseline) -> Snapshot:
-    """What a signature covers."""
+    """The content of a signature."""
     return Snapshot(
         name,
         {claim: (digest, Status(status)) for claim, digest, status, _, _ in signed.guarantees},
@@ -157,7 +158,7 @@ def of_signature(name: str, signed: Baseline) -> Snapshot:
 
 
 def of_ledger(name: str, entries: Iterable[Entry]) -> Snapshot:
-    """A ledger without its contract: each method's newest record and those that answer the same question count."""
+    """A ledger without its contract: each method's newest record and those with the same key count."""
     newest: dict[tuple[str, str], list[Entry]] = {}
     digests: dict[str, str] = {}
     for entry in entries:
@@ -181,7 +182,7 @@ def of_ledger(name: str, entries: Iterable[Entry]) -> Snapshot:
 
 
 def compare(old: Snapshot, new: Snapshot) -> tuple[Change, ...]:
-    """Every difference: what got worse first."""
+    """Every difference, the worst first."""
     if old.signed:
         kept = {name: replace(told, answers={}) for name, told in new.told.items() if "/guarantee/" in name}
         new = replace(new, claims={name: new.claims[name] for name in kept}, told=kept)
@@ -203,7 +204,7 @@ def compare(old: Snapshot, new: Snapshot) -> tuple[Change, ...]:
             elif any(_asked_again(before, after)):
                 changes.append(Change("rerun", name, was, is_, title, why))
     changes += list(_requirements(old, new, changes))
-    lost = any(change.kind in ("worse", "removed") for change in changes)  # what less is shown also supposes less
+    lost = any(change.kind in ("worse", "removed") for change in changes)  # a smaller claim also has fewer assumptions
     changes += (c for c in _assumptions(old, new) if not lost or c.kind != "better")
     word = {True: "passes", False: "fails"}
     for gate, passed in new.gates.items():
@@ -214,7 +215,8 @@ def compare(old: Snapshot, new: Snapshot) -> tuple[Change, ...]:
 
 
 def _requirements(old: Snapshot, new: Snapshot, changes: Sequence[Change]) -> Iterator[Change]:
-    """Each requirement that changed, or under which a claim changed: was, is, and the edits that may be why."""
+    """Each requirement that changed, or below which a claim changed: old and new level, and the edits that may be the
+    reason."""
     edits = list(_edits(old, new))
     for name in dict.fromkeys((*old.requirements, *new.requirements)):
         was, now = old.requirements.get(name), new.requirements.get(name)
@@ -240,8 +242,8 @@ def _move(change: Change) -> str:
 
 
 def _edits(old: Snapshot, new: Snapshot) -> Iterator[tuple[set[str], str]]:
-    """Edits of contract and plan: the claims and requirements in whose text each lies (none: others may use it), and
-    where it is, what was there, and what is."""
+    """Edits of contract and plan: the claims and requirements whose text contains each (none: others may use it), and
+    its position, the old text, and the new text."""
     spans = [(name, told.span) for name, told in new.told.items() if "/guarantee/" in name]
     spans += [(name, required.span) for name, required in new.requirements.items()]
     for path, text in new.sources.items():
@@ -275,7 +277,7 @@ def _assumptions(old: Snapshot, new: Snapshot) -> Iterator[Change]:
 
 
 def _answers(view: ObligationView) -> dict[str, Answer]:
-    """For each method its newest record that counts; where none does, the newest, and why it does not."""
+    """For each method its newest record that counts; if none counts, the newest, with the reason why it does not."""
     found: dict[str, Answer] = {}
     for item in view.evidence:
         record = item.entry.evidence
@@ -311,7 +313,7 @@ def _asked_again(before: Told, after: Told) -> Iterator[str]:
 
 
 def _why(before: Told, after: Told) -> Iterator[str]:
-    """What the evidence says about a difference, method by method; then what the claim rests on."""
+    """The reasons for a difference: the evidence, method by method; then the claims below."""
     for method in dict.fromkeys((*after.answers, *before.answers)):
         yield from _of_method(method, before.answers.get(method), after.answers.get(method))
     came = [name for name in after.below if name not in before.below]
@@ -350,7 +352,7 @@ def _said(answer: Answer) -> str:
 
 
 def _changed(was: Evidence, now: Evidence) -> Iterator[str]:
-    """Which of the things that an answer depends on are others."""
+    """The inputs of an answer that have changed."""
     if was.obligation_digest != now.obligation_digest:
         yield "the claim means something else"
     for path in dict.fromkeys((*was.inputs, *now.inputs)):

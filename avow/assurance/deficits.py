@@ -1,4 +1,4 @@
-"""Why a case says less than it seems to: each kind counted once, with what a reader should make of it."""
+"""The reasons for which a case says less than it seems to: each kind counted once, with its meaning for the reader."""
 
 from __future__ import annotations
 
@@ -54,11 +54,11 @@ _WORDS = {
         "Their inputs have not changed since; `avow verify --fresh` computes them again.",
     ),
 }
-"""Of each kind what it is called, with its number before it; the same on the first screen; what to make of it."""
+"""For each kind its name, with its number before it; the name on the first screen; and its meaning for the reader."""
 
 
 def of_deficits(kinds: int) -> str:
-    """``6 kinds of assurance deficit``: the one way in which any text counts them."""
+    """``6 kinds of assurance deficit``: the wording that every text uses."""
     return f"{count(kinds, 'kind')} of assurance deficit"
 
 
@@ -80,7 +80,7 @@ def deficits(
     missing: Mapping[tuple[str, str], str],
 ) -> tuple[Deficit, ...]:
     """`basis`: the obligations that matter (all that requirements rest on); `single`: guarantees with one method;
-    `missing`: (node, method) → the command that installs the tool that the method lacks."""
+    `missing`: (node, method) → the command that installs the method's missing tool."""
     within = set(basis)
     guarantees = [v for v in views if v.id in within and v.obligation.kind is Kind.GUARANTEE]
     unrun = [(v, method) for v in guarantees for method in _unanswered(v)]
@@ -115,13 +115,13 @@ def deficits(
 
 
 def _install(silent: Iterable[tuple[ObligationView, str]], missing: Mapping[tuple[str, str], str]) -> str:
-    """The commands that install what these methods lack."""
+    """The commands that install the missing tools of these methods."""
     found = sorted({missing.get((v.obligation.node, method), "") for v, method in silent} - {""})
     return f" Install: {'; '.join(found)}." if found else ""
 
 
 def words_of(key: str, number: int) -> str:
-    """What so many deficits of a kind are called, without the number; of a kind that there is no more, its key."""
+    """The name for so many deficits of a kind, without the number; for a kind that no longer exists, its key."""
     return _WORDS[key][0].format(s="" if number == 1 else "s") if key in _WORDS else key
 
 
@@ -130,7 +130,8 @@ def _status(view: ObligationView, relied: Mapping[str, Relied]) -> Status | None
 
 
 def _by_hand(view: ObligationView, relied: Relied) -> bool:
-    """Whether what gives the claim its status is tied to the formula by a person, in a table or by judgement."""
+    """Whether the records that give the claim its status were linked to the formula by a person, in a table or by
+    judgement."""
     sure = relied.status in EXHAUSTIVE
     alike = [r for r in view.records if weigh(r).support is relied.status or (sure and weigh(r).support in EXHAUSTIVE)]
     return relied.status is not Status.REVIEWED and all(record.link is not Link.GENERATED for record in alike)

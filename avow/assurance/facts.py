@@ -1,6 +1,6 @@
-"""What a case is made of, before anything is concluded from it: plain data, taken from a System or from a Case.
+"""The facts of a case, before any conclusion: plain data, taken from a System or from a Case.
 
-That it can be taken from a finished case as well is what lets ``avow report --check`` conclude everything again.
+Because they can be taken from a finished case as well, ``avow report --check`` can conclude everything again.
 """
 
 from __future__ import annotations
@@ -93,9 +93,9 @@ def facts_of_system(
     kernel: KernelRun | None = None,
     recorded: Sequence[Entry] | None = None,
 ) -> Facts:
-    """`sources` are the texts behind `digests`, by the same names; `discharging`: of each node the obligations that
-    settle its assumptions; `kernel`: what the kernel established in this run; `recorded`: the records as the ledger has
-    them, where `records` are as they count now. Raises Rejected for an unusable policy."""
+    """`sources` are the texts behind `digests`, by the same names; `discharging`: for each node the obligations that
+    discharge its assumptions; `kernel`: what the kernel established in this run; `recorded`: the records as the ledger
+    has them, if `records` are as they count now. Raises Rejected for an unusable policy."""
     plan = system.plan
     planned: dict[str, tuple[tuple[str, str], ...]] = {}
     for (obligation, method), key in sorted(keys.items()):
@@ -177,7 +177,7 @@ def _maps(plan: Plan) -> tuple[MapView, ...]:
 
 
 def facts_of_case(case: Case) -> Facts:
-    """What the case was made of. Raises ValueError where `case.today` is no date."""
+    """The facts that the case was made from. Raises ValueError if `case.today` is no date."""
     entries = [*case.orphans, *(view.entry for o in case.obligations for view in o.evidence)]
     findings = [
         (
@@ -243,7 +243,7 @@ def facts_of_case(case: Case) -> Facts:
 
 
 def _relative(span: Span | None, plan: Plan) -> Span | None:
-    """A place relative to the workspace (the folder above ``contracts/``): a report is the same on every machine."""
+    """A position relative to the workspace (the folder above ``contracts/``): a report is the same on every machine."""
     if span is None:
         return None
     return Span(_place(span.file, plan.path), span.line, span.column, span.end_line, span.end_column)
@@ -251,7 +251,7 @@ def _relative(span: Span | None, plan: Plan) -> Span | None:
 
 @functools.lru_cache(maxsize=1000)
 def _place(file: str, plan: Path) -> str:
-    """As `_relative`; many places lie in one file."""
+    """As `_relative`, cached: many positions are in one file."""
     if not Path(file).is_absolute() or len(plan.resolve().parents) < 3:
         return file
     root, path = plan.resolve().parents[2], Path(file)

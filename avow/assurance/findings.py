@@ -1,11 +1,10 @@
-"""Expected and accepted findings: what the plan says of results that are not good.
+"""Expected and accepted findings: the plan's statements about results that are not good.
 
 *Expected* (reproducing known-bad material) is strict both ways: a finding that is not listed fails, and so does a
-listed one that is not there, or whose last day (where it names one) has gone by. *Accepted* is a risk that a named
-person takes, for a reason, until a date. A finding that has expired excuses nothing.
-Wildcards stand for what they matched when they were written, as the plan records it; what they match besides is an
-open item. A finding with a mark (``found``) stands for what was found when it was written: a later, perhaps worse
-refutation of the same claim is another finding.
+listed one that is absent, or whose last day (if it names one) has passed. *Accepted* is a risk that a named person
+takes, for a reason, until a date. A finding that has expired excuses nothing. Wildcards cover what they matched when
+they were written, as the plan records it; further matches are open items. A finding with a mark (``found``) covers the
+refutation that was known when it was written: a later, perhaps worse refutation of the same claim is another finding.
 """
 
 from __future__ import annotations
@@ -25,7 +24,7 @@ from avow.evidence.status import Status, roll_up
 from avow.system.plan import Finding, is_wild
 
 FINDINGS = frozenset({Status.REFUTED, Status.CONTRADICTORY, Status.VACUOUS, Status.CIRCULAR})
-"""Statuses that say that something is wrong (the others say that something is lacking)."""
+"""Statuses that mean that something is wrong (the others mean that something is missing)."""
 
 
 def handle(
@@ -41,7 +40,7 @@ def handle(
 
 
 def expiry(finding: Finding) -> date | None:
-    """The last day on which a finding is accepted; None where there is none that can be read."""
+    """The last day on which a finding is accepted; None if it has no readable date."""
     try:
         return date.fromisoformat(finding.expires or "")
     except ValueError:
@@ -89,7 +88,7 @@ def _match(
 
 
 def mark(counting: Iterable[Entry]) -> str:
-    """Of what was found of a claim: who found it, and by which counterexample. The claim itself is in it, too."""
+    """A digest of what was found about a claim: the methods and their counterexamples. The claim itself is included."""
     records = (e.evidence for e in counting)
     found = [
         [e.obligation_digest, e.method, e.verdict.value, codec.to_json(e.counterexample)]
@@ -100,7 +99,7 @@ def mark(counting: Iterable[Entry]) -> str:
 
 
 def _is_out(finding: Finding, today: date) -> bool:
-    """Whether its days have gone by, have not come, or cannot be read."""
+    """Whether its last day has passed, its first day has not come, or its last day cannot be read."""
     last_day = expiry(finding)
     return (
         last_day is None or last_day < today or (finding.date is not None and date.fromisoformat(finding.date) > today)
@@ -108,8 +107,8 @@ def _is_out(finding: Finding, today: date) -> bool:
 
 
 def takes(pattern: str, matched: Sequence[str], name: str) -> bool:
-    """Whether a finding is about the obligation of that id (without the system): one with wildcards is about what it
-    matched when it was written, as the plan records it, and about nothing else."""
+    """Whether a finding covers the obligation of that id (without the system): one with wildcards covers only what it
+    matched when it was written, as the plan records it."""
     return _matches(pattern, name) and (not is_wild(pattern) or name in matched)
 
 

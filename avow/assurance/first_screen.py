@@ -1,4 +1,4 @@
-"""The first screen in words and numbers, computed once; formats only set it."""
+"""The first screen in words and numbers, computed once; formats only lay it out."""
 
 from __future__ import annotations
 
@@ -42,13 +42,14 @@ from avow.evidence.obligation import Kind
 from avow.evidence.status import Status
 
 ROWS, WORST, NODES, SQUARES, LINES, OWNERS = 6, 3, 8, 12, 5, 3
-"""So many requirements have a row each; else so many of the worst; nodes; squares for a node; changes; owners."""
+"""The most requirements that have a row each; else the number of the worst; nodes; squares for a node; changes;
+owners."""
 _WORST_FIRST = tuple(reversed(Level))
 
 
 def tone_of(level: Level, supposed: Iterable[Assumption], *, bounded: bool = False) -> Tone:
-    """A requirement's colour. Green is for what is shown of what runs, without bounds, every assumption owned and in
-    date."""
+    """A requirement's colour. Green is for a requirement shown of the program that runs, without bounds, every
+    assumption owned and in date."""
     if not level.holds:
         return Tone.RED
     return Tone.GREEN if level is Level.SHOWN and not bounded and all(s.owned for s in supposed) else Tone.AMBER
@@ -62,7 +63,7 @@ def weakest_of(
     *,
     beside: str = "",
 ) -> WeakestEvidence | None:
-    """The least evidence among claims; of another node than `beside`, where that is given."""
+    """The weakest evidence among claims; of another node than `beside`, if given."""
     found = [
         name
         for name in claims
@@ -87,7 +88,7 @@ def weakest_of(
 
 
 WARNED = "WARNED"
-"""Stands beside the verdict where every gate passes although something is known to be bad: an expected refutation, an
+"""The word beside the verdict if every gate passes although something is known to be bad: an expected refutation, or an
 accepted finding."""
 
 
@@ -107,16 +108,16 @@ def answers(
     strict: bool,
     passed: bool,
 ) -> Answers:
-    """Everything that the first screen says, but whether it is signed."""
+    """The content of the first screen, except the signature."""
     number = Counter(r.level for r in requirements)
     headline, verdict, tone = _verdict(requirements, gates, strict=strict, passed=passed)
     unrun = next((d.count for d in deficits if d.key == "programs"), 0)
-    if unrun and headline.holds:  # nothing is known of the programs
+    if unrun and headline.holds:  # the programs were not examined
         verdict = f"{verdict}; {count(unrun, 'claim')} about programs not run"
         tone = min(tone, Tone.AMBER, key=lambda t: t.rank)
     warned = ""
     bad = sum(bool(view.handled) and not view.standing.supports for view in views)
-    if bad and passed:  # whatever else holds: what is known to be bad is no green
+    if bad and passed:  # whatever else holds: with a known-bad finding the case is not green
         warned, tone = f"{WARNED}: {count(bad, 'finding')} known", Tone.RED if tone is Tone.RED else Tone.AMBER
     by_level = tuple((level, number[level]) for level in _WORST_FIRST if number[level])
     asked = [gate for gate in gates if not gate.idle]
@@ -165,7 +166,7 @@ def answers(
 def _verdict(
     requirements: Sequence[RequirementView], gates: Sequence[Gate], *, strict: bool, passed: bool
 ) -> tuple[Level, str, Tone]:
-    """The headline, what stands beside it on the first line, and its colour: the least of what the requirements are."""
+    """The headline, the text beside it on the first line, and its colour: the lowest of the requirements' levels."""
 
     def said(level: Level, more: str = "") -> str:
         return level.capitalize() + (f": {more}" if more else "")
@@ -193,7 +194,7 @@ def _verdict(
 
 
 def _badness(view: RequirementView) -> tuple[int, int, int]:
-    """Sorts the worst requirement first: colour, how it holds, how much it supposes."""
+    """Sorts the worst requirement first: colour, level, number of assumptions."""
     return view.tone.rank, _WORST_FIRST.index(view.level), -len(view.supposes)
 
 
@@ -206,7 +207,7 @@ def _listed(requirements: Sequence[RequirementView]) -> tuple[str, ...]:
 def _basis(
     node: NodeView, views: Sequence[ObligationView], relied: Mapping[str, Relied]
 ) -> tuple[NodeBasis, tuple[int, float]]:
-    """A node's line, and how weak it is: its worst colour, then how much of it has that colour. `views`: the node's."""
+    """A node's line, and how weak it is: its worst colour, then the share with that colour. `views`: the node's."""
     own = [v for v in views if v.obligation.kind is Kind.GUARANTEE]
     marks = [(_mark(view, relied), view) for view in own]
     by_object: dict[str, Counter[str]] = {}
@@ -221,14 +222,14 @@ def _basis(
 
 
 def _examined(view: ObligationView, relied: Mapping[str, Relied], views: Sequence[ObligationView]) -> str:
-    """What was looked at, where the claim is relied upon; else nothing."""
+    """The examined object, if the claim is relied upon; else empty."""
     if view.id not in relied or not view.standing.supports:
         return ""
     return examined(relied[view.id], agrees(views, view.obligation, relied[view.id].record.method))
 
 
 def _objects(views: Sequence[ObligationView], relied: Mapping[str, Relied]) -> str:
-    """What the words mean that say what was looked at, of those that the nodes' lines use."""
+    """The meaning of the words that name examined objects, for those that the nodes' lines use."""
     shown = [v for v in views if v.obligation.kind is Kind.GUARANTEE and v.id in relied and v.standing.supports]
     used = {looked_at(relied[view.id]) for view in shown}
     return "; ".join(told for what, told in OBJECTS.items() if what in used)
@@ -250,8 +251,8 @@ def _mark(view: ObligationView, relied: Mapping[str, Relied]) -> tuple[str, Tone
 def _refuted(
     requirements: Sequence[RequirementView], views: Sequence[ObligationView], nodes: Sequence[NodeView]
 ) -> str:
-    """What is refuted, and the requirements that are open; a node's guarantee before what rests on it. Empty where
-    nothing is refuted."""
+    """The refutation, and the requirements that are open; a node's guarantee before the claims that rest on it. Empty
+    if nothing is refuted."""
     wrong = [v for v in views if v.status in (Status.REFUTED, Status.CONTRADICTORY) and not v.advice]
     if not wrong:
         return ""
@@ -306,7 +307,7 @@ def _changed(changes: Changes) -> tuple[tuple[str, str], ...]:
 
 
 def with_signature(case: Case) -> Answers:
-    """The answers, with what there is to say of a signature: whose it is, and whether the case is still that one."""
+    """The answers, with the signature line: the signer, and whether the case is still the signed one."""
     return replace(case.answers, signed=_signed(case.baseline, baseline_of(case).content, case.today))
 
 

@@ -1,4 +1,5 @@
-"""One demand of the policy against one guarantee: is it met, what is lacking, what would close the gap most cheaply."""
+"""One demand of the policy against one guarantee: whether it is met, what is lacking, and the cheapest way to close the
+gap."""
 
 from __future__ import annotations
 
@@ -21,7 +22,7 @@ from avow.evidence.status import Status, effective, join, link_rank, weigh
 
 
 def shortfall(view: ObligationView, demand: Demand, policy: Policy, today: date) -> str | None:
-    """What a guarantee lacks, in words; None where the demand is met."""
+    """What a guarantee lacks, in words; None if the demand is met."""
     if not demand.one_of:
         return None
     evidence = view.records
@@ -50,9 +51,9 @@ def shortfall(view: ObligationView, demand: Demand, policy: Policy, today: date)
 
 
 def independent(evidence: Iterable[Evidence]) -> int:
-    """How many items can be chosen that differ pairwise in backend AND in tool: two wrappings of one solver are one.
+    """The largest number of items that differ pairwise in backend AND in tool: two backends with one solver count once.
 
-    This is a maximum matching between backends and tools, with an item for an edge.
+    This is a maximum matching between backends and tools, with an edge for each item.
     """
     edges: dict[str, set[str]] = {}
     for item in evidence:
@@ -82,8 +83,8 @@ def reviewers(evidence: Evidence) -> tuple[str, ...]:
 
 
 def _persons(evidence: Iterable[Evidence], demand: Demand, policy: Policy, today: date) -> list[list[str]]:
-    """Whoever reviewed the claim, in one record or in several that each count, each under all names taken for one; a
-    key is one person's whatever names it signs."""
+    """The persons who reviewed the claim, in one record or in several that each count, each with all names that are
+    taken for one person; a key belongs to one person, whatever names it signs."""
     reviews = [
         item
         for item in evidence
@@ -105,7 +106,7 @@ def _taken_for_one(persons: list[list[str]]) -> str:
 
 
 def _age_days(evidence: Evidence, today: date) -> int | None:
-    """Days since the evidence came about: a person's date where the details give one, else the attempt's start."""
+    """Days since the evidence was made: by a person's date if the details give one, else by the attempt's start."""
     for text in (evidence.details.get("date"), evidence.started):
         if isinstance(text, str):
             try:
@@ -116,12 +117,12 @@ def _age_days(evidence: Evidence, today: date) -> int | None:
 
 
 def _disregarded(item: Evidence, demand: Demand, policy: Policy, today: date) -> str | None:
-    """Why a supporting item does not count; refutations and failures are never disregarded."""
+    """The reason why a supporting item does not count; refutations and failures are never disregarded."""
     support = weigh(item).support
     if support is None:
         return None
     age = _age_days(item, today)
-    if age is not None and age < -1:  # a clock of another zone may be a day ahead
+    if age is not None and age < -1:  # a clock in another time zone may be a day ahead
         return "dated in the future"
     limit = demand.max_age(support)
     if limit is not None:
@@ -156,12 +157,12 @@ def _against_vacuity(view: ObligationView) -> str:
             return (
                 "assume less: an environment must be able to go on for ever, and each guarantee's trigger to come about"
             )
-        case _:  # a guarantee, most of all
+        case _:  # above all a guarantee
             return "give the method inputs that meet the guarantee's trigger"
 
 
 def suggest(view: ObligationView, demand: Demand | None, facts: Facts) -> Suggestion:
-    """The cheapest step: repair what is wrong, run or install what is planned, else add a method that fits."""
+    """The cheapest step: repair what is wrong, run or install what is planned, else add a suitable method."""
     match view.status:
         case Status.REFUTED:
             return Suggestion(
@@ -170,7 +171,7 @@ def suggest(view: ObligationView, demand: Demand | None, facts: Facts) -> Sugges
         case Status.CONTRADICTORY:
             return Suggestion(_two_answers(view), cost=100)
         case Status.ERROR:
-            # the same question is not asked twice: it has to change, or be asked afresh
+            # the same job is not run again by itself: its input has to change, or the run be fresh
             again = f"`avow verify --fresh {facts.system}`"
             failed = next((r for r in view.records if r.verdict is Verdict.ERROR), None)
             said = f" `{failed.method}`: {_clipped(failed.summary)}" if failed is not None else " the tool"
@@ -231,7 +232,8 @@ def _clipped(text: str) -> str:
 
 
 def _two_answers(view: ObligationView) -> str:
-    """Of one and the same thing two answers cannot both be right; a model and a trace of the robot may well differ."""
+    """Two opposite answers about one object cannot both be right; a model and a recording of the robot may well
+    differ."""
     records = view.records
     for proof in (r for r in records if effective(r) is Verdict.PROVED):
         for refutation in (r for r in records if r.verdict is Verdict.REFUTED):
@@ -249,17 +251,18 @@ def _files(paths: set[str]) -> str:
 
 
 def _expired(view: ObligationView) -> tuple[str, ...]:
-    """The methods whose answers were given until a day that is past, and that have given none since."""
+    """The methods whose answers were valid until a day that has passed, and that have given none since."""
     return tuple(dict.fromkeys(v.entry.evidence.method for v in view.evidence if v.currency is Currency.EXPIRED))
 
 
 def _wants_a_reason(view: ObligationView) -> bool:
-    """A condition that no tool settles, only a person's reason; the evidence says where it belongs."""
+    """Whether only a person's reason can discharge this condition, and no tool can; its evidence says where the reason
+    belongs."""
     return not view.obligation.formula or view.obligation.name.startswith("environment.")
 
 
 def reason_wanted(name: str) -> str:
-    """Where in the plan the reason belongs that a condition of the composition lacks."""
+    """The place in the plan for the reason that a condition of the composition lacks."""
     goal, _, key = name.partition(".")
     if name.startswith("start."):
         return "say what a delayed edge of the loop carries first: `connections: [{…, delayed: true, initial: …}]`"
@@ -272,7 +275,7 @@ def reason_wanted(name: str) -> str:
 
 
 def missing_tools(facts: Facts) -> Mapping[tuple[str, str], str]:
-    """(node, method) → the command that installs the tool that the planned method lacks."""
+    """(node, method) → the command that installs the planned method's missing tool."""
     install = {info.name: info.install for info in facts.methods if not info.available}
     planned = [(node.name, method, backend) for node in facts.nodes for method, backend in node.methods]
     return {(node, method): install[backend] for node, method, backend in planned if backend in install}
@@ -298,7 +301,7 @@ def _new_method(view: ObligationView, demand: Demand, used: Mapping[str, str], f
         return strong_enough or Status(info.strength) in demand.one_of
 
     def dear(info: MethodInfo) -> int:
-        """Persons are dearer than machines, and what must be installed first than what is here."""
+        """Persons cost more than machines, and tools to be installed more than installed ones."""
         by_hand = 5 if info.link is Link.GUIDED else 0
         return order.get(info.strength, 9) + by_hand + (0 if info.available else 5)
 

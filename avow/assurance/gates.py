@@ -1,4 +1,4 @@
-"""The gates: what the policy asks, held against the case. They, and nothing else, decide the exit code."""
+"""The gates: the policy's demands, applied to the case. The exit code depends only on them."""
 
 from __future__ import annotations
 
@@ -74,14 +74,15 @@ def _worded(view: ObligationView) -> str:
 def _behind(
     derivations: Sequence[DerivationView], views: Mapping[str, ObligationView], unwritten: set[str]
 ) -> set[str]:
-    """The open conditions of derivations that rest on an unwritten guarantee: they are asked for once it is written."""
+    """The open conditions of derivations that rest on an unwritten guarantee: no gate asks for them until it is
+    written."""
     below = {name for d in derivations if not unwritten.isdisjoint(d.below) for name in d.below if name in views}
     views_below = [views[name] for name in below]
     return {v.id for v in views_below if v.obligation.kind is Kind.COMPOSITION and v.status is Status.UNKNOWN}
 
 
 def exit_code(found: Iterable[Gate]) -> int:
-    """0: all pass; 3: some fail, and each of them only for want of a tool; 1: else."""
+    """0: all pass; 3: some fail, and each of them only because of a tool; 1: otherwise."""
     failed = [gate for gate in found if not gate.passed]
     if not failed:
         return 0
@@ -161,7 +162,8 @@ def _nothing_wrong(facts: Facts, obligations: Sequence[ObligationView], excused:
 
 
 def _held_to(name: str, title: str, views: Sequence[ObligationView], good: Sequence[Status], excused: set[str]) -> Gate:
-    """That each of some claims stands as the policy asks; where it names no status, nothing is asked."""
+    """A gate: each of some claims has a status that the policy accepts; if the policy names no status, it asks
+    nothing."""
     return _gate(
         name,
         title,
@@ -175,7 +177,7 @@ def _held_to(name: str, title: str, views: Sequence[ObligationView], good: Seque
 
 
 def _not_run(views: Sequence[ObligationView], good: Sequence[Status]) -> str:
-    """A policy may accept that a claim stays open where its tool is missing: the gate says how many do."""
+    """A policy may accept that a claim stays open if its tool is missing: the gate gives the number of such claims."""
     many = sum(view.status is Status.NOT_RUN for view in views)
     return f"; {many} not run, which the policy accepts" if many and Status.NOT_RUN in good else ""
 
@@ -185,7 +187,7 @@ def _in_words(good: Sequence[Status]) -> str:
 
 
 def _short_of(status: Status, good: Sequence[Status]) -> str:
-    """``supposed, but proved or checked is asked``; of what supports nothing the bare word."""
+    """``justified, but proved or checked is asked``; the bare word for a status that supports nothing."""
     return f"{status.value}, but {_in_words(good)} is asked" if status.supports else status.value
 
 
@@ -217,7 +219,7 @@ def _guarantees(facts: Facts, obligations: Sequence[ObligationView], excused: se
 def _programs(
     facts: Facts, obligations: Sequence[ObligationView], relied: Mapping[str, Relied], excused: set[str]
 ) -> Iterable[Gate]:
-    """That a program answers as its model matters where a guarantee of its node is relied upon of a model."""
+    """Agreement of a program with its model is asked for only if a guarantee of its node relies on a model."""
     own = [v for v in obligations if v.obligation.kind is Kind.PROGRAM]
     if not own:
         return
@@ -240,7 +242,7 @@ def _derivations(
     excused: set[str],
     unwritten: set[str],
 ) -> Gate:
-    """What waits only for guarantees to be written is told by their own gate."""
+    """Derivations that wait only for unwritten guarantees are reported by the gate *unwritten*."""
     wanted = bool(facts.policy.composition)
     failing = [d for d in derivations if wanted and not d.status.supports]
     bad = [d for d in failing if not _all_excused(d.below, excused | unwritten)]
@@ -274,7 +276,7 @@ def _requirements(
     good = facts.policy.requirements
     failing = [r for r in requirements if good and (r.status not in good or not (r.level.holds or r.awaits_validation))]
     causes = {r.id: r.below or r.failing or _weak(r, derivations, views, good) for r in failing}
-    # what is wrong with the requirement itself, no finding beneath it excuses
+    # a finding below does not excuse a fault of the requirement itself
     own = {r.id for r in failing if r.outdated or r.unknown_names}
     bad = [r for r in failing if r.id in own or not _all_excused(causes[r.id], excused)]
     let_off = tuple(requirement_claim(r.id) for r in failing if r not in bad)
@@ -306,8 +308,8 @@ def _requirements(
 def _rates(
     facts: Facts, requirements: Sequence[RequirementView], views: Mapping[str, ObligationView]
 ) -> Iterable[Gate]:
-    """That a requirement that rests on samples is shown to fail no oftener than the policy allows for the most critical
-    node beneath it."""
+    """A gate: a requirement that rests on samples fails no more often than the policy allows for the most critical node
+    below it."""
     allowed = dict(facts.policy.max_failure_rate)
     if not allowed:
         return
@@ -334,7 +336,8 @@ def _rates(
 
 
 def _standing(requirement: RequirementView, good: Sequence[Status]) -> str:
-    """Why it does not count; one that would hold by its own evidence may still rest on what has failed or expired."""
+    """The reason why it does not count; one that would hold by its own evidence may still rest on what has failed or
+    expired."""
     if requirement.outdated:
         return "not validated: its sentence, formula or support was changed since a person read them"
     if requirement.status not in good:
@@ -348,8 +351,8 @@ def _weak(
     views: Mapping[str, ObligationView],
     good: Sequence[Status],
 ) -> tuple[str, ...]:
-    """What makes a requirement that holds weaker than is asked: all under it that is itself weaker than is asked.
-    Nothing where the requirement is only prose: that no finding beneath it can excuse."""
+    """The claims that make a requirement weaker than is asked: all below it that are themselves weaker than is asked.
+    Empty if the requirement is only prose: no finding below it can excuse that."""
     if not (requirement.formula or requirement.temporal) and Status.ARGUED not in good:
         return ()
     rests = {derivation_claim(d.derivation.name): d.rests_on for d in derivations}
@@ -419,7 +422,7 @@ def _gate(
 
 
 def _holding(supported: Sequence[bool], asked: bool, excused: int = 0) -> str:
-    """What a gate that passes says: never more than is so."""
+    """The text of a gate that passes: never more than holds."""
     if not supported:
         return "there are none"
     counts = f"{sum(supported)} of {len(supported)} are supported"
@@ -433,7 +436,7 @@ def _suggestion(view: ObligationView) -> tuple[Suggestion, ...]:
 
 
 def suggestion_for(view: ObligationView, facts: Facts, today: date) -> Suggestion | None:
-    """The cheapest step that would close an obligation's gap; None where there is no gap."""
+    """The cheapest step that would close an obligation's gap; None if there is no gap."""
     lacking: str | None
     if view.obligation.kind is Kind.GUARANTEE:
         demand = facts.policy.demand(view.criticality)

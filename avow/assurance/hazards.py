@@ -1,4 +1,4 @@
-"""A hazard with its mitigations, as a case holds them. `avow.assurance.mitigated` makes them."""
+"""A hazard with its mitigations, as a case holds them. `avow.assurance.mitigated` computes them."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ class Mitigation:
     """One entry under `mitigated_by`."""
 
     name: str
-    """As the hazards' file names it."""
+    """The name in the hazards' file."""
     words: str
-    """What it is, for people."""
+    """A description for readers."""
     level: Level
-    """How far it is shown: the least of the claims that it stands for."""
+    """How far it is shown: the lowest level of its claims."""
     claims: tuple[str, ...]
-    """A requirement's own claims, or the guarantees that the name stands for."""
+    """A requirement's own claims, or the guarantees that the name covers."""
 
 
 @dataclass(frozen=True, slots=True)
 class HazardView:
-    """A hazard with its mitigations. `level` is that of the weakest; *not shown* where there is none."""
+    """A hazard with its mitigations. `level` is that of the weakest; *not shown* if there are none."""
 
     hazard: Hazard
     mitigations: tuple[Mitigation, ...]
@@ -38,6 +38,6 @@ class HazardView:
 
     @property
     def stands(self) -> str:
-        """How it stands, in a phrase."""
+        """Its level, in a phrase."""
         weakest = self.weakest
         return f"{self.level} (weakest: {weakest.name})" if weakest else "no mitigation"

@@ -1,8 +1,8 @@
-"""What a report keeps of the ledger: all that can count, every refutation, and of the rest the newest few.
+"""The records that a report keeps of the ledger: all that can count, every refutation, and the newest few of the rest.
 
-What is left out can change no conclusion: a record with another key than the plan's is of an earlier state, and of
-several that say the same of the same, and stand or fall together, the newest counts. The ledger has the others, and how
-the case came about over the runs is computed from the ledger before anything is left out.
+The records left out change no conclusion: a record with another key than the plan's is of an earlier state, and among
+records with the same result for the same claim that count under the same conditions, the newest counts. The ledger has
+the others, and the history of the case over the runs is computed from the ledger before anything is left out.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from avow.evidence.status import Status, roll_up, weigh
 
 @dataclass(frozen=True, slots=True)
 class Point:
-    """After a run: how many claims were supported, refuted (or contradicted), and neither."""
+    """The number of claims after a run that were supported, refuted (or contradicted), and neither."""
 
     run: str
     started: str
@@ -35,9 +35,9 @@ class Point:
 @dataclass(frozen=True, slots=True)
 class History:
     left_out: int = 0
-    """Records of earlier states that stand in the ledger alone."""
+    """Records of earlier states that only the ledger has."""
     points: tuple[Point, ...] = ()
-    """Where the claims stood after each of the last runs."""
+    """The claims' statuses after each of the last runs."""
 
 
 def history(
@@ -45,10 +45,11 @@ def history(
 ) -> tuple[frozenset[str], History]:
     """The hashes of the records that a report keeps of a ledger, oldest first, and the history of all of them.
 
-    Kept is every refutation (of those by the same example the newest), and of each claim and method the newest of what
-    says the same in answer to the question as `planned` for (obligation, method), and the newest of the others. The
-    records are to be as the ledger has them: whether one of them is of an earlier state for another reason than its key
-    may change without the ledger."""
+    It keeps every refutation (the newest of those by the same example), and for each claim and method the newest record
+    of each result with the key in `planned` for (obligation, method), and the newest of the others. The records must be
+    as the ledger has them: whether one of them is of an earlier state for another reason than its key may change
+    without the ledger.
+    """
     digests = {o.id: o.digest for o in obligations}
     kept: set[str] = set()
     others: Counter[tuple[object, ...]] = Counter()
@@ -67,7 +68,7 @@ def history(
 
 
 def _says(record: Evidence, refuting: bool) -> tuple[object, ...]:
-    """Two current records, or refutations, of a claim and a method that have this in common count alike."""
+    """The key by which two current records, or refutations, of a claim and a method count alike."""
     details = {name: plain(item) for name, item in record.details.items() if refuting or name in STANDS_ON}
     left = sorted(record.outputs.items()) if "certificate" in details else []
     shown = to_json(record.counterexample), record.key, record.obligation_digest
@@ -75,8 +76,8 @@ def _says(record: Evidence, refuting: bool) -> tuple[object, ...]:
 
 
 def _trend(records: Sequence[Entry], claims: set[str]) -> tuple[Point, ...]:
-    """One point a run that left evidence, oldest first. As keys of the past are not kept, a method's newest record of
-    the time is taken as current; for the last run see the case itself."""
+    """One point for each run that left evidence, oldest first. As past keys are not kept, a method's newest record at
+    that time is taken as current; for the last run see the case itself."""
     ours = [entry.evidence for entry in records if entry.evidence.obligation in claims]
     known: dict[str, dict[str, list[Evidence]]] = {}
     statuses: dict[str, Status] = {}

@@ -27,8 +27,8 @@ def hazard_views(
     nodes: Sequence[NodeView],
     opinion: Opinion,
 ) -> tuple[HazardView, ...]:
-    """The hazards in their order. Guarantees as mitigations are judged as a requirement that rests on them, with all
-    that they rest on and assume; `relied`: claim → the record that it relies on."""
+    """The hazards in their order. Guarantees as mitigations are judged like a requirement that rests on them, with
+    everything that they rest on and assume; `relied`: claim → the record that it relies on."""
     known = {r.id: r for r in requirements}
     titles = {node.name: node.title for node in nodes}
     clauses = {f"{node.name}.{clause}" for node in nodes for clause, _ in node.guarantees}
@@ -60,7 +60,7 @@ def hazard_views(
         return Mitigation(name, words, level, tuple(view.id for view in own)), tone
 
     def judged(own: Sequence[str], by: Mapping[str, Relied]) -> tuple[Level, Tone]:
-        """How far guarantees are shown by their records `by`, and by those of all that they rest on."""
+        """How far guarantees are shown by their records `by`, and by the records of everything that they rest on."""
         closed = closure.of(own)
         mine = [s for s in supposed if not set(closed.claims).isdisjoint(s.where)]
         taken = {name: one for name, one in {**relied, **by}.items() if name not in own or name in by}
@@ -82,7 +82,7 @@ def hazard_views(
 
 
 def _of_method(view: ObligationView, method: str, opinion: Opinion) -> Relied | None:
-    """The record of one method that may be relied upon for a guarantee; None where an assumption of it has expired."""
+    """The record of one method that may be relied upon for a guarantee; None if one of its assumptions has expired."""
     own = tuple(item for item in view.evidence if item.entry.evidence.method == method)
     found = relied_upon(replace(view, evidence=own), opinion)
     late = found is not None and any(opinion(method, text).expired for text in found.assumptions)

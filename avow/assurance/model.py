@@ -1,8 +1,8 @@
-"""The assurance case as data: what every report format is rendered from, and nothing else.
+"""The assurance case as data: the only source of every report format.
 
-One frozen object holds it all, so that two formats cannot disagree. The first part is what the pipeline hands in
-(`RunInfo`, `ToolInfo`, `MethodInfo`, `Derivation`; `Discrepancy` is the audit's), the second what `conclude` makes.
-Times and dates are texts in ISO 8601; paths are relative to the workspace; every text is data, never markup.
+One frozen object holds it all, so that two formats cannot disagree. The pipeline passes in the first part (`RunInfo`,
+`ToolInfo`, `MethodInfo`, `Derivation`; `Discrepancy` is the audit's), and `conclude` makes the second. Times and dates
+are texts in ISO 8601; paths are relative to the workspace; every text is data, never markup.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ from avow.system.plan import Statement, Validation
 
 @dataclass(frozen=True, slots=True)
 class RunInfo:
-    """The run that asked for this case. `limits` are what one needs to reproduce it (seed, seconds, megabytes…)."""
+    """The run that requested this case. `limits` are what is needed to reproduce it (seed, seconds, megabytes…)."""
 
     id: str
     started: str
@@ -49,13 +49,13 @@ class RunInfo:
     """Whether every cache was ignored (``avow verify --fresh``)."""
     command: str = ""
     revision: str = ""
-    """The git revision of the workspace, where there is one."""
+    """The git revision of the workspace, if there is one."""
     limits: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
 class ToolInfo:
-    """A tool as found on the machine; `version` is None where it is missing."""
+    """A tool as found on the machine; `version` is None if it is missing."""
 
     name: str
     version: str | None
@@ -64,7 +64,7 @@ class ToolInfo:
 
 @dataclass(frozen=True, slots=True)
 class MethodInfo:
-    """A kind of method that could be used: one backend, in the core's words."""
+    """A kind of method that could be used: one backend, in the core's terms."""
 
     name: str
     title: str
@@ -74,22 +74,23 @@ class MethodInfo:
     available: bool = True
     install: str = ""
     unsuited: tuple[str, ...] = ()
-    """Nodes whose contracts do not look like what it verifies: it is not suggested for them."""
+    """Nodes whose contracts do not have the form that it verifies: it is not suggested for them."""
 
 
 @dataclass(frozen=True, slots=True)
 class SideCondition:
-    """One side condition of a rule's application: its text, and the composition obligation that settles it."""
+    """One side condition of a rule's application: its text, and the composition obligation that discharges it."""
 
     text: str
     obligation: str
-    """An obligation's full id; empty where the condition is settled by form alone."""
+    """An obligation's full id; empty if the condition holds by form alone."""
 
 
 @dataclass(frozen=True, slots=True)
 class Derivation:
     """One derivation of the calculus, or one instance of a rule. `text` has it in the paper's notation, in lines;
-    `premises` are nodes, whose guarantees it rests on, or derivations; `conditional` is what nothing shows."""
+    `premises` are nodes, whose guarantees it rests on, or derivations; `conditional` are the hypotheses of its
+    conclusion."""
 
     name: str
     rule: str
@@ -104,17 +105,17 @@ class Derivation:
 
 
 class Currency(StrEnum):
-    """Where a record stands in time; computed, never stored."""
+    """Whether a record still counts, and if not, why; computed, never stored."""
 
     CURRENT = "current"
     SUPERSEDED = "superseded"
-    """A newer attempt at the same question said the same, or did answer where this one failed to."""
+    """A newer attempt with the same key gave the same result, or answered where this one failed to."""
     SET_ASIDE = "set aside"
-    """Not of this run, which believes no earlier support (``--fresh``)."""
+    """Of another run, and this run uses no earlier support (``--fresh``)."""
     STALE = "stale"
     """The claim, an input, an option or a tool has changed since."""
     EXPIRED = "expired"
-    """Whoever gave it said until when it may be relied upon (``valid_until`` in its details), and that day is past."""
+    """The record was valid until a day (``valid_until`` in its details) that has passed."""
     WITHDRAWN = "withdrawn"
     """The plan no longer uses this method for this claim."""
 
@@ -124,9 +125,9 @@ class EvidenceView:
     entry: Entry
     currency: Currency
     counts: bool
-    """Whether it takes part in the claim's status: exactly if it is current."""
+    """Whether it contributes to the claim's status: exactly if it is current."""
     cut_to: Verdict | None = None
-    """Set where the record claims more than its method can show: what it counts as instead."""
+    """Set if the record claims more than its method can show: the verdict that counts instead."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -143,46 +144,46 @@ class Handled:
     expires: str
     expired: bool
     obligations: tuple[str, ...]
-    """What it stands for; empty: for nothing."""
+    """The obligations that it covers; empty: none."""
     matched: tuple[str, ...] = ()
-    """As the plan records it, where the pattern has wildcards."""
+    """As the plan records it, if the pattern has wildcards."""
     unlisted: tuple[str, ...] = ()
-    """What the wildcards match besides: it is not handled."""
+    """Further matches of the wildcards: they are not handled."""
     found: str = field(default="", metadata=codec.LATER)
-    """The mark of the finding that is meant, as the plan records it; empty: whatever is found."""
+    """The mark of the finding that is meant, as the plan records it; empty: any finding."""
     now: str = field(default="", metadata=codec.LATER)
-    """The mark of what is found now, where the plan has another or none: another is not handled."""
+    """The mark of the present finding, if the plan has another or none: a finding with another mark is not handled."""
 
 
 @dataclass(frozen=True, slots=True)
 class Suggestion:
-    """The cheapest thing that would close a gap. `cost` orders suggestions and means nothing else."""
+    """The cheapest step that would close a gap. `cost` orders suggestions and has no other meaning."""
 
     text: str
     method: str = ""
     cost: int = 0
 
 
-@dataclasses.dataclass(frozen=True)  # without slots: it keeps what counts, which every format asks for
+@dataclasses.dataclass(frozen=True)  # without slots: it caches the records that count, which every format needs
 class ObligationView:
-    """One obligation with all that is known of it."""
+    """One obligation with everything known about it."""
 
     obligation: Obligation
     criticality: str
     status: Status
     standing: Status
-    """The status all things considered: `unsupported` where its own evidence is good but what it rests on fails."""
+    """The status with all claims below it: `unsupported` if its own evidence is good but one of them fails."""
     evidence: tuple[EvidenceView, ...]
     """Oldest first."""
     planned: tuple[tuple[str, str], ...]
     """(method, key as of now) of every attempt that the plan asks for."""
     rests_on: tuple[str, ...] = ()
     below: tuple[str, ...] = ()
-    """Claims beneath it that fail in themselves."""
+    """Claims below it that fail by their own evidence."""
     hypotheses: tuple[str, ...] = ()
     link: Link | None = None
     handled: str = ""
-    """``expected`` or ``accepted``, where the plan speaks of its finding."""
+    """``expected`` or ``accepted``, if the plan handles its finding."""
     suggestion: Suggestion | None = None
 
     @property
@@ -191,7 +192,7 @@ class ObligationView:
 
     @property
     def advice(self) -> bool:
-        """Whether it is a claim whose failing is worth knowing, but makes nothing unsound."""
+        """Whether its failure is useful to know, but makes nothing unsound."""
         return is_advice(self.obligation)
 
     @functools.cached_property
@@ -200,7 +201,7 @@ class ObligationView:
 
     @functools.cached_property
     def records(self) -> tuple[Evidence, ...]:
-        """What counts, without its place in the ledger."""
+        """The records that count, without their places in the ledger."""
         return tuple(view.entry.evidence for view in self.counting)
 
 
@@ -215,9 +216,9 @@ class RequirementView:
     supported_by: tuple[str, ...]
     """As the plan names them."""
     rests_on: tuple[str, ...]
-    """The claims that those names stand for."""
+    """The claims that those names denote."""
     unknown_names: tuple[str, ...]
-    """Names under `supported_by` that stand for nothing."""
+    """Names under `supported_by` that denote nothing."""
     status: Status
     weakest: str
     weakest_status: Status
@@ -225,16 +226,16 @@ class RequirementView:
     hypotheses: tuple[str, ...]
     link: Link | None
     obligations: tuple[str, ...]
-    """Its own obligations (entailment, model checking), where it has a formula or a temporal property."""
+    """Its own obligations (entailment, model checking), if it has a formula or a temporal property."""
     answer: str
-    """One line for people."""
+    """One line for readers."""
     level: Level = Level.NOT_SHOWN
-    """How far it is shown: the word of every format."""
+    """How far it is shown: the term that every format uses."""
     bounded: bool = False
-    """Whether its formula or property was settled within the plan's finite scenario only."""
+    """Whether its formula or property was discharged within the plan's finite scenario only."""
     tone: Tone = Tone.RED
     closure: tuple[str, ...] = ()
-    """Every obligation under it, closed: a guarantee with what discharges its node's assumptions, and so on."""
+    """Every obligation below it, closed: a guarantee with what discharges its node's assumptions, and so on."""
     failing: tuple[str, ...] = ()
     """Those of them that do not hold."""
     weakest_evidence: WeakestEvidence | None = None
@@ -243,49 +244,49 @@ class RequirementView:
     expired: bool = False
     """Whether one of these is past its last day."""
     rate: RateView | None = field(default=None, metadata=codec.LATER)
-    """How often it may fail, where it rests on samples."""
+    """How often it may fail, if it rests on samples."""
     span: Span | None = None
     validation: Validation | None = None
     validated: bool = False
-    """Whether a person has read its sentence against its formula and support, as they are now."""
+    """Whether a person has read its present sentence against its present formula and support."""
     outdated: bool = False
     """Whether a person has read another sentence, formula or support."""
     linked: str = ""
-    """Digest of what the names under `supported_by` say in the contract."""
+    """Digest of the contract's text for the names under `supported_by`."""
     source: str = field(default="", metadata=codec.LATER)
-    """The document that it comes from, and the place in it."""
+    """The document that it comes from, and the position in it."""
 
     @property
     def formal(self) -> str:
-        """Its formula or temporal property; empty where it is prose."""
+        """Its formula or temporal property; empty if it is prose."""
         return self.formula or self.temporal
 
     @property
     def meaning(self) -> str:
-        """A digest of what it says, and of what a person says that it rests on."""
+        """A digest of its text and formulas, and of the names under `supported_by`."""
         return sha256("\n".join((self.text, self.formula, self.temporal, *self.supported_by)))
 
     @property
     def stands(self) -> str:
-        """How far it is shown, and how often it may fail where that rests on samples."""
+        """How far it is shown, and how often it may fail if that rests on samples."""
         return f"{self.level} ({self.rate.brief})" if self.rate and self.level.holds else f"{self.level}"
 
     @property
     def awaits_validation(self) -> bool:
-        """Whether nothing is missing but a person who reads the sentence against the formula."""
+        """Whether only a person's validation of the sentence against the formula is missing."""
         return (
             not self.level.holds and self.status.supports and not (self.failing or self.unknown_names or self.expired)
         )
 
     @property
     def words(self) -> str:
-        """What it says, in the plan's words if there are any."""
+        """Its text, in the plan's words if there are any."""
         return self.text or self.formal
 
 
 @dataclass(frozen=True, slots=True)
 class DerivationView:
-    """A derivation and where it stands. `conditional` is what no obligation settles."""
+    """A derivation and its status. `conditional` is what no obligation discharges."""
 
     derivation: Derivation
     status: Status
@@ -306,9 +307,9 @@ class NodeView:
     """(clause name, sentence or formula)."""
     assumptions: tuple[tuple[str, str], ...]
     title: str = ""
-    """What people call it."""
+    """The node's name for readers."""
     discharged_by: tuple[str, ...] = ()
-    """The obligations (without the system) that settle its assumptions: its guarantees count only with these."""
+    """The obligations (without the system) that discharge its assumptions: its guarantees count only with these."""
     inputs: tuple[tuple[str, str], ...] = field(default=(), metadata=codec.LATER)
     """(input, the node that feeds it; empty: the environment does)."""
 
@@ -319,14 +320,14 @@ class EnvironmentView:
     assume: str
     because: str
     constant: bool = False
-    """Whether it is declared to be the same at every step."""
+    """Whether it is declared to have the same value at every step."""
     nodes: tuple[str, ...] = ()
     """The nodes that read it."""
 
 
 @dataclass(frozen=True, slots=True)
 class SourceView:
-    """A text that the case was made of, exactly as it stood: a contract with its comments, or the plan."""
+    """A text that the case was made from, unchanged: a contract with its comments, or the plan."""
 
     path: str
     """Relative to the workspace; `Case.digests` has the text's SHA-256 under the same name."""
@@ -339,12 +340,12 @@ class SourceView:
 
 @dataclass(frozen=True, slots=True)
 class MapView:
-    """Places that counterexamples may speak of: (x, y, label) as exact text, from a table of the plan's scenario."""
+    """Places that counterexamples may name: (x, y, label) as exact text, from a table of the plan's scenario."""
 
     name: str
     points: tuple[tuple[str, str, str], ...]
     places: tuple[str, ...] = ()
-    """Words of calls whose argument is a label."""
+    """Names of calls whose argument is a label."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -357,11 +358,11 @@ class OpenItem:
     suggestion: str = ""
     handled: str = ""
     advice: bool = False
-    """Worth knowing, but nothing fails for it."""
+    """Useful to know, but no gate fails for it."""
     title: str = ""
-    """What the claim says, in a sentence."""
+    """The claim, in a sentence."""
     reason: str = ""
-    """Why it is so, in the words of the plan's `expected` or `accepted`."""
+    """The reason, in the words of the plan's `expected` or `accepted`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -376,11 +377,11 @@ class Gate:
     suggestions: tuple[Suggestion, ...] = ()
     excused: tuple[str, ...] = ()
     asks: str = ""
-    """What the policy asks here, as a phrase, where the title does not say it all."""
+    """The policy's demand, as a phrase, if the title does not give all of it."""
     tool_failure: bool = False
     """It fails only because a tool is missing or broke (exit code 3)."""
     idle: bool = False
-    """The policy asks nothing here: that it does not fail says nothing."""
+    """The policy asks nothing here: that the gate does not fail has no meaning."""
 
     @property
     def state(self) -> str:
@@ -389,27 +390,27 @@ class Gate:
 
     @property
     def mark(self) -> str:
-        """Stands beside the state."""
+        """The mark shown beside the state."""
         return "–" if self.idle else "✘" if not self.passed else "◐" if self.excused else "✔"
 
 
 class Grade(StrEnum):
-    """Whether what is proved of composition and requirements has to be believed."""
+    """Whether the proofs of composition and requirements are certified."""
 
     CHECKED = "CHECKED"
     """Some such proof has no certificate, or there is none, or the ledger's digests were not verified."""
     CERTIFIED = "CERTIFIED"
-    """The kernel established every such proof of the calculus again in this run, and every digest was verified."""
+    """The kernel re-established every such proof of the calculus in this run, and every digest was verified."""
 
     @property
     def word(self) -> str:
-        """For people, after the word *proofs*: it says nothing of the verdict, beside which it stands."""
+        """The text after the word *proofs*; it is independent of the verdict beside it."""
         return "certified" if self is Grade.CERTIFIED else "not certified"
 
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """The whole case. `exit_code`: 0 every gate passes; 1 one fails; 3 one fails for want of a tool, and no other."""
+    """The whole case. `exit_code`: 0 every gate passes; 1 one fails; 3 one fails because of a tool, and no other."""
 
     system: str
     title: str
@@ -420,7 +421,7 @@ class Case:
     fresh: bool
     """Whether every answer was computed in this run, and every digest verified."""
     freshness: str
-    """Why it is so, or is not."""
+    """The reason for `fresh`."""
     kernel: KernelRun
     proofs: tuple[ProofView, ...]
     trusted: tuple[Trusted, ...]
@@ -449,7 +450,7 @@ class Case:
     methods: tuple[MethodInfo, ...]
     discrepancies: tuple[Discrepancy, ...]
     audited: bool
-    """Whether every digest was computed again for this case; without it no discrepancy can be known of."""
+    """Whether every digest was computed again for this case; otherwise no discrepancy can be known."""
     strict: bool
     """Whether the plan lists the expected findings (strictly: all of these and no others)."""
     orphans: tuple[Entry, ...] = ()
@@ -459,16 +460,16 @@ class Case:
     standard: StandardView | None = field(default=None, metadata=codec.LATER)
     """The objectives of the standard that the policy names."""
     graph_svg: str = ""
-    """The dataflow picture; shown as an image, never as markup."""
+    """The dataflow diagram; shown as an image, never as markup."""
     maps: tuple[MapView, ...] = ()
     statements: tuple[Statement, ...] = ()
-    """The plan's words for what is supposed."""
+    """The plan's words for the assumptions."""
     baseline: Baseline | None = None
     """The last signed report, as far as this one is compared with it."""
     sources: tuple[SourceView, ...] = ()
-    """Contracts first, then the plan. No verdict is concluded from them; the remarks on how they are written are."""
+    """Contracts first, then the plan. No verdict depends on them; the remarks on how they are written do."""
     earlier: bool = False
-    """Whether the system cannot be read as it stands now, or is gone: this is what was said of it before."""
+    """Whether the system cannot be read now, or is gone: this case is then its earlier state."""
 
     def obligation(self, name: str) -> ObligationView:
         """The obligation of that id. Raises KeyError."""
@@ -485,7 +486,7 @@ class Case:
         return tuple(known[name] for name in self.answers.listed)
 
     def said(self, name: str) -> Handled | None:
-        """What the plan says of a claim's finding: the first entry with a reason that matches it, else any."""
+        """The plan's entry for a claim's finding: the first with a reason that matches it, else any."""
         matching = [finding for finding in self.findings if name in finding.obligations]
         return next((f for f in matching if f.reason), matching[0] if matching else None)
 

@@ -1,4 +1,4 @@
-"""The argument in modules, as GSN has them: one for each requirement, one for each node, nothing twice.
+"""The argument in GSN modules: one for each requirement, one for each node, nothing twice.
 
 A requirement's module points at nodes by *away goals*; a node's module holds its guarantees with their evidence.
 """
@@ -20,12 +20,12 @@ from avow.evidence.status import Status
 class RequirementModule:
     requirement: RequirementView
     because: str
-    """How it comes to hold, as a sentence."""
+    """The reason for its level, as a sentence."""
     strategy: str
     away: tuple[tuple[str, str, str], ...]
-    """(node, what people call it, how many of its guarantees count here and how they stand)."""
+    """(node, its name for readers, the number of its guarantees that count here with their statuses)."""
     conditions: str
-    """How many conditions of the composition are met here; empty where there are none."""
+    """The number of conditions of the composition that are met here; empty if there are none."""
     supposes: tuple[str, ...]
     """Numbers of assumptions."""
     failing: tuple[str, ...]

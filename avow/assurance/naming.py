@@ -1,6 +1,6 @@
-"""Names of claims, for people and for machines.
+"""Names of claims, for readers and for programs.
 
-An obligation's claim bears its id; a requirement's is ``requirement:REQ1``, a derivation's ``derivation:D1``.
+An obligation's claim has its id; a requirement's is ``requirement:REQ1``, a derivation's ``derivation:D1``.
 """
 
 from __future__ import annotations
@@ -11,10 +11,10 @@ import shlex
 from avow.evidence.obligation import Kind, Obligation
 
 ADVICE = ("not-redundant", "constrained", "determined", "needed")
-"""Sanity properties that are worth knowing, but that make nothing unsound."""
+"""Sanity properties that are useful to know, but whose failure makes nothing unsound."""
 
 FOUNDATION = ("assumptions-satisfiable", "consistent", "realizable")
-"""Sanity properties without which a node's guarantees say nothing."""
+"""Sanity properties without which a node's guarantees have no meaning."""
 
 
 def requirement_claim(name: str) -> str:
@@ -37,14 +37,14 @@ _SANITY = {
     "meetable": "can be met by what its inputs come from",
     "needed": "is needed",
 }
-"""What a sanity claim states, in words that follow a clause's name."""
+"""The statement of a sanity claim, in words that follow a clause's name."""
 
 
 def short(claim: str) -> str:
     """``agent.low`` for a guarantee, ``REQ1``, ``D1``, else the id without the system (an assumption has none).
 
-    Where the id of a claim misleads people, words: a sanity claim is ``agent.low (can be triggered)`` and not
-    ``agent/sanity/not-vacuous-low``, what the plan says of the environment ``what is assumed of in.away``.
+    If the id of a claim would mislead readers, words: a sanity claim is ``agent.low (can be triggered)`` and not
+    ``agent/sanity/not-vacuous-low``, an assumption about the environment ``what is assumed of in.away``.
     """
     kind, colon, name = claim.partition(":")
     if colon and kind in ("requirement", "derivation"):
@@ -72,7 +72,7 @@ def short(claim: str) -> str:
 
 
 def sanity_property(obligation: Obligation) -> str:
-    """Which of the sanity properties an obligation is about: its name up to the clause, if it names one."""
+    """The sanity property that an obligation is about: its name up to the clause, if it names one."""
     return _property(obligation.name)
 
 
@@ -93,7 +93,7 @@ def is_foundation(obligation: Obligation) -> bool:
 
 
 def rerun(obligation: Obligation, method: str) -> str:
-    """The command that asks a method about a claim again, from the workspace's folder."""
+    """The command that re-runs a method on a claim, from the workspace's folder."""
     o = obligation
     match o.kind:
         case Kind.SANITY:

@@ -48,12 +48,12 @@ class Demand:
     """Empty: any."""
     unconditional: bool = False
     isolation: Isolation = Isolation.NONE
-    """How far a program under test had to be kept from its judge; evidence for which nothing was run has no such
+    """The isolation that a program under test needs from its oracle; evidence for which nothing was run has no
     level."""
     of: tuple[Object, ...] = ()
-    """What has to have been verified; empty: anything."""
+    """The objects that may have been verified; empty: any."""
     numbers: tuple[Numbers, ...] = ()
-    """What a REAL has to have been; empty: anything."""
+    """The semantics of REAL that may have been used; empty: any."""
 
     def max_age(self, status: Status) -> int | None:
         ages = dict(self.max_age_days)
@@ -79,7 +79,7 @@ class Demand:
 
 @dataclass(frozen=True, slots=True)
 class Policy:
-    """A whole policy. The tuples of statuses name what is good enough; an empty one asks for nothing."""
+    """A whole policy. The tuples of statuses name the accepted ones; an empty one demands nothing."""
 
     name: str
     title: str
@@ -89,7 +89,7 @@ class Policy:
     composition: tuple[Status, ...]
     requirements: tuple[Status, ...]
     programs: tuple[Status, ...] = ()
-    """Of what is claimed of a node's program besides its guarantees."""
+    """For the claims about a node's program besides its guarantees."""
     reviewers: tuple[str, ...] = ()
     certified: bool = False
     proved: bool = False
@@ -97,9 +97,9 @@ class Policy:
     max_failure_rate: tuple[tuple[str, str], ...] = field(default=(), metadata=codec.LATER)
     """(criticality, decimal): how often a requirement that rests on samples may fail."""
     standard: str = field(default="", metadata=codec.LATER)
-    """The standard whose objectives are asked (a key of `standards.yaml`); empty: none."""
+    """The standard whose objectives are demanded (a key of `standards.yaml`); empty: none."""
     level: str = field(default="", metadata=codec.LATER)
-    """Its level, as the standard calls it."""
+    """Its level, in the standard's terms."""
 
     def demand(self, criticality: str) -> Demand:
         """The demand for a criticality; an unknown one is treated as the highest."""
@@ -109,7 +109,7 @@ class Policy:
 
 @dataclass(frozen=True, slots=True)
 class Technique:
-    """A row of the guidance table: a technique, how it shows here, and (profile, recommendation) pairs."""
+    """A row of the guidance table: a technique, its verdict here, and (profile, recommendation) pairs."""
 
     name: str
     verdict: str
@@ -126,7 +126,7 @@ def profile_names() -> tuple[str, ...]:
 
 
 def costs() -> Mapping[str, int]:
-    """How dear a method is by the verdict that it can give: an order, not an amount."""
+    """The cost of a method by the verdict that it can give: an order, not an amount."""
     return _data()[1]
 
 
@@ -136,7 +136,7 @@ def techniques() -> tuple[Technique, ...]:
 
 
 def read_policy(located: Located) -> Policy:
-    """The policy that a plan's ``policy:`` section means; none means ``default``. Raises Rejected with all faults."""
+    """The policy of a plan's ``policy:`` section; ``default`` if there is none. Raises Rejected with all faults."""
     match located.data:
         case None | {} if not located.data:
             return profile("default")
@@ -206,7 +206,7 @@ class _PolicyReader:
         self.faults.append(Diagnostic("POLICY002", f"{where}: {message}", self.located.at(*path), hint=hint))
 
     def rule(self, key: str, data: object, base: Policy) -> Any:
-        """What the plan says under a key of the policy, as `Policy` has it."""
+        """The plan's value of a policy key, in the form of `Policy`."""
         match key:
             case "guarantees":
                 return _demands(base, data, self)
@@ -220,7 +220,7 @@ class _PolicyReader:
                 return True
             case "max_failure_rate":
                 return self.rates(data, (key,))
-            case "programs":  # `not-run` accepts that a program's claims stay open where its tool is missing
+            case "programs":  # `not-run` accepts that a program's claims stay open if its tool is missing
                 return self.statuses(data, (key,), (*_GIVEN, Status.NOT_RUN.value))
             case _:  # the others name statuses
                 return self.statuses(data, (key,))
@@ -231,7 +231,7 @@ class _PolicyReader:
             return Demand()
         self.faults += _unknown(data, _DEMAND_KEYS, self.located, path)
         return Demand(
-            # another demand is one of support, of whatever status
+            # any other demand also demands support, of any status
             one_of=self.statuses(data.get("one_of") or (_GIVEN if {*data} - {"one_of"} else ()), (*path, "one_of")),
             methods=self.count(data.get("methods", 1), (*path, "methods")),
             independent=self.flag(data.get("independent", False), (*path, "independent")),
@@ -304,7 +304,7 @@ class _PolicyReader:
 
 
 def asked_of(demand: Demand) -> str:
-    """The statuses that are good enough, in words."""
+    """The accepted statuses, in words."""
     return " or ".join(status.value for status in demand.one_of)
 
 

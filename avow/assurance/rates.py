@@ -1,4 +1,4 @@
-"""How often a claim may fail, where it rests on samples: the union bound over its sampled leaves."""
+"""How often a claim may fail, if it rests on samples: the union bound over its sampled leaves."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from avow.assurance.model import ObligationView
 
 LEAST_CONFIDENCE = Fraction(9, 10)
-"""Below it, a rate is no evidence that a policy's limit is kept."""
+"""Below it, a rate is no evidence that a policy's limit is met."""
 
 _SAMPLED = (Status.TESTED, Status.MONITORED)
 
@@ -41,20 +41,20 @@ class RateView:
     bound: str
     """An exact decimal; empty: no rate can be given."""
     confidence: str
-    """Of all leaves together."""
+    """The joint confidence of all leaves."""
     leaves: tuple[Leaf, ...]
     """Sampled claims, by id, that have a rate."""
     why: str = field(default="", metadata=LATER)
-    """Why no rate can be given."""
+    """The reason why no rate can be given."""
 
     @property
     def trial(self) -> Trial:
-        """What is counted, where there is a rate: all leaves count the same."""
+        """The unit that is counted, if there is a rate: all leaves have the same."""
         return self.leaves[0].strata[0].trial
 
     @property
     def brief(self) -> str:
-        """Beside the word for how far something is shown. A bound is rounded up, a confidence down."""
+        """The text beside the level. A bound is rounded up, a confidence down."""
         if not self.bound or Fraction(self.bound) >= 1:
             return "with no bound on failures"
         sure = percent(self.confidence, ROUND_FLOOR)
@@ -75,14 +75,14 @@ class RateView:
 
 @dataclass(frozen=True, slots=True)
 class _Composes:
-    """As `avow.calculus.trials.composes` writes it."""
+    """The form in which `avow.calculus.trials.composes` writes it."""
 
     at_once: bool
     beyond: tuple[str, ...]
 
 
 def rate_of(own: Iterable[str], claims: Iterable[str], views: Mapping[str, ObligationView]) -> RateView | None:
-    """The rate of a requirement by its own claims and all that it rests on; None where nothing of that is sampled."""
+    """The rate of a requirement by its own claims and everything that it rests on; None if none of that is sampled."""
     leaves, unrated = [], []
     for name in claims:
         if (view := views.get(name)) is None:
@@ -120,7 +120,7 @@ def _composes(record: Evidence) -> _Composes | None:
 
 
 def misstated(rate: RateView) -> str:
-    """Why a rate does not follow from the samples that it names; empty where it does."""
+    """The reason why a rate does not follow from the samples that it names; empty if it does."""
     if not rate.bound:
         return ""
     try:
@@ -132,7 +132,7 @@ def misstated(rate: RateView) -> str:
 
 
 def exceeds(rate: RateView, most: str) -> str:
-    """Why a rate is not known to stay within a limit; empty where it is."""
+    """The reason why a rate is not known to be within a limit; empty if it is."""
     if not rate.bound:
         return rate.words
     if Fraction(rate.bound) > Fraction(most):
@@ -143,7 +143,7 @@ def exceeds(rate: RateView, most: str) -> str:
 
 
 def sample(record: Evidence) -> tuple[Stratum, ...]:
-    """The strata that a record counts, each with its bound; none where it does not say."""
+    """The strata that a record counts, each with its bound; empty if it names none."""
     try:
         strata = from_json(tuple[Stratum, ...], record.details.get(RATE, []))
         return strata if all(0 <= Fraction(s.bound) <= 1 and Fraction(s.confidence) < 1 for s in strata) else ()
@@ -152,11 +152,11 @@ def sample(record: Evidence) -> tuple[Stratum, ...]:
 
 
 def percent(part: str, rounding: str = ROUND_HALF_EVEN) -> str:
-    """``25.8 %`` of ``0.258``, to three digits."""
+    """``25.8 %`` for ``0.258``, to three digits."""
     value = Context(prec=3, rounding=rounding).create_decimal(Decimal(part) * 100)
     return f"{value.normalize():f} %"
 
 
 def _decimal(value: Fraction) -> str:
-    """Bounds and confidences are decimals, and so are their sums; another number is a fraction, as exact."""
+    """Bounds and confidences are decimals, and so are their sums; any other number is written as an exact fraction."""
     return decimal(value) or str(value)

@@ -1,8 +1,8 @@
-"""The record of each guarantee that is relied upon, and what was seen, in words with its bound.
+"""The record of each guarantee that is relied upon, and what was observed, in words with its bound.
 
-Of several records that support a claim one is chosen: one whose assumptions have not expired before any other, then
-one that is a proof or an exhaustive check, then one of the program itself before one no stronger of a model, then one
-whose assumptions all have an owner. A proof of the node's source supposes in the open what one of a model leaves out.
+If several records support a claim, one is chosen: first one whose assumptions have not expired, then one that is a
+proof or an exhaustive check, then one of the program itself before one of a model that is no stronger, then one whose
+assumptions all have an owner. A proof of the node's source states assumptions that a proof of a model leaves out.
 """
 
 from __future__ import annotations
@@ -25,12 +25,12 @@ if TYPE_CHECKING:
 LETTERS = {"proved": "P", "checked": "C", "tested": "T", "monitored": "M", "reviewed": "R", "justified": "J"}
 EXHAUSTIVE = frozenset({Status.PROVED, Status.CHECKED})
 EVIDENCE = frozenset({*EXHAUSTIVE, Status.TESTED, Status.MONITORED, Status.REVIEWED})
-"""What tools and readers found; a plan's reason is none."""
+"""The findings of tools and readers; a reason in the plan is not among them."""
 
 
 @dataclass(frozen=True, slots=True)
 class Judged:
-    """What is thought of one hypothesis of a record: whether it is out of date, and whether somebody answers for it."""
+    """The state of one hypothesis of a record: whether it has expired, and whether it has an owner."""
 
     expired: bool
     owned: bool
@@ -38,7 +38,8 @@ class Judged:
 
 @dataclass(frozen=True, slots=True)
 class Relied:
-    """The record relied upon, what it counts as, and its assumptions (hypotheses that are no claims of the case)."""
+    """The record relied upon, the status that it counts as, and its assumptions (hypotheses that are no claims of the
+    case)."""
 
     record: Evidence
     status: Status
@@ -48,17 +49,17 @@ class Relied:
 
     @property
     def bounded(self) -> bool:
-        """Whether nothing is said outside a finite scenario or model."""
+        """Whether it holds only within a finite scenario or model."""
         return self.status is Status.CHECKED or any(h.kind is HypothesisKind.BOUND for h in self.record.rests_on)
 
 
 Opinion = Callable[[str, str], Judged]
-"""(method, hypothesis) → what is thought of it."""
+"""(method, hypothesis) → the state of the hypothesis."""
 
 
 def relied_upon(view: ObligationView, opinion: Opinion, views: Iterable[ObligationView] = ()) -> Relied | None:
-    """None where nothing supports the claim. Of two models, one that the program was compared with (`views`) counts
-    first."""
+    """None if nothing supports the claim. Of two models, one that the program was compared with (`views`) is
+    preferred."""
     if not view.status.supports:
         return None
     ways = []
@@ -102,17 +103,17 @@ OBJECTS: Mapping[Object, str] = {
     Object.BINARY: "binary: the node's program as built",
     Object.RECORDING: "recordings: of its runs",
 }
-"""What was looked at, for who meets the word for the first time."""
+"""The examined objects, explained for new readers."""
 
 
 def looked_at(relied: Relied) -> Object | None:
-    """None of a person's word."""
+    """None for a person's statement."""
     return relied.record.of if relied.status in (*EXHAUSTIVE, Status.TESTED, Status.MONITORED) else None
 
 
 def agrees(views: Iterable[ObligationView], guarantee: Obligation, method: str) -> Status | None:
-    """How it stands that the node's program answers as the model by which a method supports a guarantee; None where it
-    was not compared with that model, or not in what the guarantee is about."""
+    """The status of the claim that the node's program agrees with the model by which a method supports a guarantee;
+    None if it was not compared with that model, or not in the outputs that the guarantee is about."""
     for view in views:
         o = view.obligation
         if (o.kind, o.name, o.node) == (Kind.PROGRAM, ProgramClaim.LINKED, guarantee.node):
@@ -123,7 +124,8 @@ def agrees(views: Iterable[ObligationView], guarantee: Obligation, method: str) 
 
 
 def examined(relied: Relied, link: Status | None = None) -> str:
-    """What was looked at: ``(source in float64)``; empty of a person's word. `link` is what `agrees` says."""
+    """The examined object: ``(source in float64)``; empty for a person's statement. `link` is the result of
+    `agrees`."""
     match looked_at(relied):
         case None:
             return ""
@@ -138,13 +140,13 @@ def examined(relied: Relied, link: Status | None = None) -> str:
 
 
 def kept_apart(record: Evidence) -> str:
-    """How what was run was kept from the judge's files and processes, in words; empty where nothing is recorded."""
+    """How the program was isolated from the oracle's files and processes, in words; empty if nothing is recorded."""
     return _APART.get(str(record.details.get(ISOLATION, "")), "")
 
 
 def upper_bound(record: Evidence) -> float | None:
-    """The greatest part of cases that may fail, at the record's confidence: where the claim has a condition, of those
-    that met it. None where the record gives no such bound."""
+    """The greatest share of cases that may fail, at the record's confidence: if the claim has a condition, among those
+    that met it. None if the record gives no such bound."""
     found = [
         float(value)
         for key, value in record.bound.items()
@@ -157,7 +159,7 @@ def upper_bound(record: Evidence) -> float | None:
 
 
 def judgements(record: Evidence) -> int:
-    """How many cases, runs or judgements it rests on; 0 where it does not say."""
+    """The number of cases, runs or judgements that it rests on; 0 if it names none."""
     for key in ("triggered", "judged", "runs", "cases"):
         value = record.bound.get(key)
         if isinstance(value, int) and not isinstance(value, bool):
@@ -172,7 +174,7 @@ def weakness(relied: Relied) -> tuple[int, float, int]:
 
 
 def seen(relied: Relied) -> str:
-    """What was seen, with its bound: ``47 runs, 0 failed (95 % confidence: at most 6.2 % fail)``."""
+    """What was observed, with its bound: ``47 runs, 0 failed (95 % confidence: at most 6.2 % fail)``."""
     bound = relied.record.bound
     match relied.status:
         case Status.PROVED if relied.record.hypotheses:
@@ -203,12 +205,12 @@ def seen(relied: Relied) -> str:
             return f"observed {count(bound['judged'], 'time')}{on}, none against it"
         case Status.REVIEWED:
             return "read by a person who accepts it" + (" on conditions" if relied.record.hypotheses else "")
-        case _:  # no status of the others bounds how often it fails
+        case _:  # no other status bounds how often it fails
             return f"{relied.status}, without a bound on failures"
 
 
 def _at_most(record: Evidence) -> str:
-    """Always with the confidence: without it the bound would seem to be certain."""
+    """Always with the confidence: without it the bound would seem certain."""
     bound, confidence = upper_bound(record), record.bound.get("confidence")
     if bound is None:
         return ", with no bound on failures"
@@ -220,6 +222,6 @@ def _at_most(record: Evidence) -> str:
 
 
 def _rounded(part: float, way: str) -> str:
-    """In percent, to two digits. A bound is rounded up: smaller than it is it is none; a confidence down."""
+    """In percent, to two digits. A bound is rounded up, as a smaller number would be no bound; a confidence down."""
     value = Context(prec=2, rounding=way).create_decimal(Decimal(str(part)) * 100)
     return f"{value.normalize():f} %"

@@ -1,8 +1,7 @@
-"""What the language checker remarks about the contracts' text (formulas that another bracketing would change, names
-that nothing uses, sentences that say otherwise), and methods about their own input. Nothing fails for them, but a claim
-about a formula that was read otherwise than it was meant is a claim about something else: so a report that keeps silent
-on them would mislead.
-"""
+"""The remarks of the language checker on the contracts' text (formulas that another bracketing would change, names that
+nothing uses, sentences that differ from their formulas), and of methods on their own input. No gate fails for them, but
+if a formula was read otherwise than it was meant, its claim is about something else: a report without them would
+mislead."""
 
 from __future__ import annotations
 
@@ -22,18 +21,18 @@ from avow.system.strict_yaml import Piece, read_yaml
 REMARK = "remark"
 """The kind of these open items; all of them are advice."""
 _FIRST = ("RCL401", "RCL413", "RCL414", "RCL415", "RCL412")
-"""Another bracketing means something else, a sentence says otherwise, a function cannot say what is meant: remarks that
-change what a verdict is about."""
+"""Another bracketing has another meaning, a sentence differs from its formula, a function cannot express what is meant:
+remarks that change what a verdict is about."""
 
 
 _READ = ("lints_off", "requirements", "\\")
-"""A plan without any of these has no key that is read here: a backslash may spell one otherwise."""
+"""A plan without any of these has no key that is read here: a backslash may spell a key otherwise."""
 
 
 def remarks(sources: Sequence[SourceView], views: Sequence[ObligationView]) -> tuple[OpenItem, ...]:
-    """An advice for each lint of the contracts, with the guarantee or assumption that it stands in, of the plan's
-    requirements, and for each remark of a method: first what changes what a verdict is about, then the methods', then
-    the rest."""
+    """Advice for each lint of the contracts, with the guarantee or assumption that contains it, of the plan's
+    requirements, and for each remark of a method: first those that change what a verdict is about, then the methods',
+    then the rest."""
     contract, found = _checked(tuple((s.path, s.text) for s in sources if s.is_contract))
     plans = [root for source in sources if (root := _plan(source)) is not None]
     off = _switched_off(plans)
@@ -52,7 +51,7 @@ def remarks(sources: Sequence[SourceView], views: Sequence[ObligationView]) -> t
 def _of_requirements(
     plan: Piece, contract: Contract, views: Sequence[ObligationView], off: frozenset[str]
 ) -> Iterator[OpenItem]:
-    """What the sentences of requirements say otherwise than their formulas."""
+    """The differences between requirements' sentences and their formulas."""
     elements = elements_of(contract.nodes)
     for name, _, piece in plan.keyed("requirements"):
         text, formula = piece.at("text"), piece.at("formula")
@@ -62,12 +61,12 @@ def _of_requirements(
         try:
             told = tuple(said_otherwise(text.text, formula.text, contract, elements, text.span))
         except Rejected:
-            continue  # of a system taken in: its own report has it
+            continue  # of an included system: its own report has it
         yield from (_item(d, text.span, claim or name) for d in told if d.code not in off)
 
 
 def _of_methods(views: Sequence[ObligationView], off: frozenset[str]) -> Iterator[OpenItem]:
-    """What the methods' checks remarked when they gave the answers that count; each once, at the first claim."""
+    """The remarks of the methods' checks with the answers that count; each once, at the first claim."""
     seen = set[tuple[str, str, str]]()
     for view in views:
         for record in view.records:
@@ -93,11 +92,11 @@ def _plan(source: SourceView) -> Piece | None:
     try:
         return read_yaml(source.text.encode("utf-8", "replace"), source.path)[0]
     except Rejected:
-        return None  # somebody edited the text that a report holds; `avow report --check` tells
+        return None  # the text in the report was edited; `avow report --check` reports it
 
 
 def _switched_off(plans: Sequence[Piece]) -> frozenset[str]:
-    """The plans' `lints_off`, read from their texts: the report is concluded from what it holds, on any machine."""
+    """The plans' `lints_off`, read from their texts: the report is concluded from its own data, on any machine."""
     listed = [found for plan in plans if (found := plan.at("lints_off"))]
     return frozenset(piece.text for found in listed for piece in (found.items or [found]))
 
@@ -109,7 +108,7 @@ def _item(found: Diagnostic, span: Span, claim: str) -> OpenItem:
 
 
 def _clauses(views: Sequence[ObligationView]) -> dict[tuple[str, int], str]:
-    """File and line → the first guarantee that stands there."""
+    """File and line → the first guarantee there."""
     found: dict[tuple[str, int], str] = {}
     for view in views:
         span = view.obligation.span

@@ -1,9 +1,9 @@
-"""ReqIF 1.x files (and .reqifz archives of them) as rows of cells: what the import of requirements makes use of.
+"""ReqIF 1.x files (and .reqifz archives of them) as rows of cells, for the import of requirements.
 
-Reads what tools export: attribute values by the long names of their definitions, XHTML as text with its blocks apart,
-enumerations by their values' names, defaults where an object has no value of its own; in the order of the
-specifications' hierarchies. Chapter headings are no requirements. A document type is refused when it begins, in
-whatever encoding: nothing is fetched, nothing is expanded. Errors are diagnostics with a place.
+Reads the exports of tools: attribute values by the long names of their definitions, XHTML as text with its blocks
+separated, enumerations by their values' names, defaults if an object has no value of its own; in the order of the
+specifications' hierarchies. Chapter headings are no requirements. A document type is refused when it begins, in any
+encoding: nothing is fetched, nothing is expanded. Errors are diagnostics with a position.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ from avow.base.tuning.sizes import REQIF_BYTES, REQIF_DEPTH
 _BLOCKS = frozenset(
     ("p", "div", "br", "hr", "li", "ul", "ol", "dl", "dt", "dd", "table", "caption", "tr", "td", "th", "pre")
 ) | {"blockquote", *(f"h{n}" for n in range(1, 7))}
-"""XHTML elements that part words."""
+"""XHTML elements that separate words."""
 _OBJECT = " [a picture or embedded object] "
-"""What stands for something that is no text: a requirement must not vanish because it is a picture."""
+"""The text in place of an object that is no text: a requirement must not vanish because it is a picture."""
 _VALUE, _DEFINITION = "ATTRIBUTE-VALUE-", "ATTRIBUTE-DEFINITION-"
 _HEADING = ("reqif.chaptername", "chaptername", "heading")
 _HEADING_TYPES = ("heading", "chapter", "headline")
@@ -32,7 +32,7 @@ _HEADING_TYPES = ("heading", "chapter", "headline")
 
 @dataclass(slots=True)
 class Thing:
-    """A SPEC-OBJECT: its values by the definitions' identifiers, and where it stands."""
+    """A SPEC-OBJECT: its values by the definitions' identifiers, and its line."""
 
     line: int
     identifier: str
@@ -43,7 +43,7 @@ class Thing:
 
 @dataclass(slots=True)
 class _ReqifReader:
-    """Builds no tree: what is wanted is put down as it goes by."""
+    """Builds no tree: values are recorded while the file is read."""
 
     file: str
     parser: expat.XMLParserType
@@ -57,7 +57,7 @@ class _ReqifReader:
     """Object type → long name."""
     enumerated: dict[str, str] = field(default_factory=dict)
     order: dict[str, None] = field(default_factory=dict)
-    """Objects as the hierarchies have them."""
+    """Objects in the order of the hierarchies."""
     thing: Thing | None = None
     type: str = ""
     definition: str = ""
@@ -67,7 +67,7 @@ class _ReqifReader:
     reference: str = ""
     text: list[str] = field(default_factory=list)
     in_text: int = 0
-    """How deep within the value's XHTML."""
+    """The depth within the value's XHTML."""
 
     def start(self, name: str, attributes: dict[str, str]) -> None:
         tag = name.rpartition("}")[2]
@@ -132,7 +132,7 @@ class _ReqifReader:
             self.order.setdefault(target)
 
     def settle(self) -> None:
-        """A value is an object's, or the default in a definition."""
+        """Stores a value as an object's, or as the default in a definition."""
         if self.thing is not None:
             self.thing.values[self.reference] = self.value
         elif "DEFAULT-VALUE" in self.path and self.type:
@@ -161,7 +161,7 @@ def read_objects(data: bytes, file: str) -> Iterator[tuple[Thing, dict[str, str]
 
 
 def _is_heading(values: Mapping[str, str], kind: str) -> bool:
-    """A chapter's title is for readers; what it says nothing can meet."""
+    """A chapter's title is for readers, and no requirement."""
     if any(word in kind for word in _HEADING_TYPES):
         return True
     texts = [v for name, v in values.items() if "text" in name or name in ("description", "statement")]
@@ -210,7 +210,7 @@ def _documents(data: bytes, file: str) -> Iterator[tuple[str, bytes]]:
                 raise Rejected(Diagnostic("REQS001", f"{file} unpacks to more than {REQIF_BYTES // 1_000_000} MB"))
             found = []
             for item in inside:
-                with archive.open(item) as stream:  # no more than it says: an archive may lie about its sizes
+                with archive.open(item) as stream:  # no more than the stated size: an archive may lie about its sizes
                     found.append((f"{file}:{item.filename}", stream.read(item.file_size + 1)))
     except (zipfile.BadZipFile, NotImplementedError, RuntimeError, OSError, EOFError, ValueError) as error:
         raise Rejected(Diagnostic("REQS001", f"{file} is no archive that can be read: {error}")) from None

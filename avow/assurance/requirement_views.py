@@ -1,4 +1,4 @@
-"""A requirement as a reader meets it: where it stands, how it comes to hold, on what weakest evidence."""
+"""A requirement as readers see it: its status, how it comes to hold, and its weakest evidence."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def held(
     supposed: Sequence[Assumption],
     titles: Mapping[str, str],
 ) -> RequirementView:
-    """A requirement with how it holds, its colour, weakest evidence and what it supposes; `titles` are the nodes'."""
+    """A requirement with its level, its colour, weakest evidence and assumptions; `titles` are the nodes'."""
     mine = [s for s in supposed if view.id in s.needed_by]
     expired = any(s.expired for s in mine)
     fails = not view.status.supports or closed.failing or view.unknown_names or expired
@@ -102,8 +102,8 @@ def is_bounded(claims: Iterable[str], relied: Mapping[str, Relied]) -> bool:
 
 
 def level_of(claims: Iterable[str], views: Mapping[str, ObligationView], relied: Mapping[str, Relied]) -> Level:
-    """The least of claims that hold. What a person answers for in the composition is among the assumptions; agreement
-    of a program with its model is said of the model."""
+    """The lowest level among claims that hold. Conditions of the composition that a person answers for are among the
+    assumptions; agreement of a program with its model counts under the model."""
     below = [(views[name].obligation.kind, relied[name]) for name in claims if name in relied]
     leaves = [found for kind, found in below if kind in (Kind.GUARANTEE, Kind.REQUIREMENT)]
     statuses = {found.status for found in leaves}
@@ -118,8 +118,8 @@ def level_of(claims: Iterable[str], views: Mapping[str, ObligationView], relied:
 def _failing_of(
     closed: Closed, views: Mapping[str, ObligationView], titles: Mapping[str, str]
 ) -> WeakestEvidence | None:
-    """What fails under an open requirement stands where the weakest evidence else stands; of several a guarantee first,
-    then the worst."""
+    """The failing claim below an open requirement, in place of the weakest evidence; of several a guarantee first, then
+    the worst."""
     statuses = {name: views[name].status for name in closed.failing if name in views}
     own = [name for name in statuses if views[name].obligation.kind is Kind.GUARANTEE]
     for name in worst_first(own or statuses, statuses)[:1]:

@@ -2,7 +2,7 @@
 
 CSV has a header row; its columns are found by their names (``id``, ``statement``, ``text``…), whatever their case.
 ReqIF: every SPEC-OBJECT that is no heading, in the order of the specification (`avow.assurance.reqif`). Errors are
-diagnostics with codes REQS001 to REQS004, located where there is a line.
+diagnostics with codes REQS001 to REQS004, located if there is a line.
 """
 
 from __future__ import annotations
@@ -106,8 +106,8 @@ def _no_text(data: bytes, file: str) -> str:
 
 
 def plan_section(requirements: Iterable[Requirement]) -> str:
-    """The ``requirements:`` section of a plan.yaml; every text is quoted. It is read once more before it is given out:
-    raises Rejected where a requirement would not read back as it is."""
+    """The ``requirements:`` section of a plan.yaml; every text is quoted. Raises Rejected if a requirement would not
+    read back unchanged."""
     requirements = tuple(requirements)
     lines = ["requirements:"]
     for r in requirements:
@@ -130,7 +130,7 @@ def plan_section(requirements: Iterable[Requirement]) -> str:
 
 
 def _content(requirement: Requirement) -> dict[str, object]:
-    """What the section of a plan says of a requirement."""
+    """The content of a requirement's entry in a plan."""
     said = {"text": requirement.text, "formula": requirement.formula, "temporal": requirement.temporal}
     return {**{k: v for k, v in said.items() if v or k == "text"}, "supported_by": list(requirement.supported_by)}
 

@@ -11,7 +11,7 @@ from avow.base.plain import count, listed
 
 
 def hazards_gate(hazards: Sequence[HazardView]) -> Iterable[Gate]:
-    """That each hazard has mitigations, and all of them hold; none where no hazard is listed."""
+    """A gate: each hazard has mitigations, and all of them hold; no gate if no hazard is listed."""
     if not hazards:
         return
     bare = [view for view in hazards if not view.mitigations]
@@ -37,7 +37,7 @@ def hazards_gate(hazards: Sequence[HazardView]) -> Iterable[Gate]:
 
 
 def standard_gate(standard: StandardView) -> Gate:
-    """That every objective which a case can serve is served; what is outside of Avow is not asked here."""
+    """A gate: every objective that a case can serve is served; objectives outside of Avow are not demanded."""
     lacking = [o for o in standard.objectives if o.state is State.OPEN]
     reason = "; ".join(f"{o.id}: {o.why}" for o in lacking) or standard.counts
     title = f"Objectives of {standard.title} that contracts can serve"

@@ -17,14 +17,14 @@ from avow.evidence.envelope import Opened, seal, unseal
 
 PREDICATE = "https://avow.invalid/signed-case/v2"
 KEYS = "keys"
-"""In ``signed/``: public keys (``*.pub``). Where there are any, only what one of them signed is a baseline."""
+"""In ``signed/``: public keys (``*.pub``). If there are any, only a signature by one of them is a baseline."""
 
 
 def sign_case(
     case: Case, report: Path, signed: Path, *, who: str, until: date, today: date, private: Path | None
 ) -> Path:
     """Write a signature of the case to ``signed/<system>/`` and return its path. Raises Rejected for an unusable key,
-    OSError where nothing can be written."""
+    OSError if nothing can be written."""
     told = baseline_of(case, who=who, signed_on=today.isoformat(), until=until.isoformat())
     folder = signed / case.system
     number = 1 + max((_number(path) for path in folder.glob("*.json")), default=0)
@@ -53,8 +53,8 @@ def sign_case(
 
 
 def newest_signed(signed: Path, system: str) -> tuple[Baseline | None, tuple[str, ...]]:
-    """The newest signature of a system's case that verifies, and why newer ones do not. Raises Rejected for a key in
-    ``signed/keys`` that cannot be read."""
+    """The newest signature of a system's case that verifies, and the reasons why newer ones do not. Raises Rejected for
+    a key in ``signed/keys`` that cannot be read."""
     refused: list[str] = []
     for path in sorted((signed / system).glob("*.json"), key=_number, reverse=True):
         found = read_signed(path)
@@ -65,7 +65,8 @@ def newest_signed(signed: Path, system: str) -> tuple[Baseline | None, tuple[str
 
 
 def read_signed(path: Path) -> Baseline | str:
-    """A signature in ``signed/<system>/``, or why it does not count. Raises Rejected as `newest_signed` does."""
+    """A signature in ``signed/<system>/``, or the reason why it does not count. Raises Rejected as `newest_signed`
+    does."""
     system, trusted = path.parent.name, sorted((path.parent.parent / KEYS).glob("*.pub"))
     try:
         opened = unseal(read_regular(path).decode("utf-8"), trusted)

@@ -1,7 +1,8 @@
-"""Objectives of standards, and what of a case serves each: DO-178C with DO-333, ISO 26262, UL 4600, IEC 61508, ECSS.
+"""Objectives of standards, and the part of a case that serves each: DO-178C with DO-333, ISO 26262, UL 4600, IEC 61508,
+ECSS.
 
 The data are in `standards.yaml`. A policy that names a standard asks for the objectives that a case can serve. The
-others are listed as outside of Avow, with what they need. Serving an objective is no statement of compliance.
+others are listed as outside of Avow, with their needs. Serving an objective is no statement of compliance.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
 
 
 class Query(StrEnum):
-    """What of a case may serve an objective."""
+    """The parts of a case that may serve an objective."""
 
     VALIDATED = "validated"
     """A person has read each requirement's sentence against its formula or support."""
@@ -36,7 +37,7 @@ class Query(StrEnum):
     SOURCES = "sources"
     """Each requirement names the document that it comes from."""
     REQUIREMENTS = "requirements"
-    """Each requirement holds, on whatever evidence the policy accepts."""
+    """Each requirement holds, on any evidence that the policy accepts."""
     TRACE = "trace"
     """Each requirement leads to evidence, and each guarantee serves a requirement."""
     SANITY = "sanity"
@@ -48,7 +49,7 @@ class Query(StrEnum):
     SOURCE = "source"
     """Each guarantee of high criticality is shown of the source or the binary."""
     PROGRAMS = "programs"
-    """What is claimed of programs passes its gate, and none is left unanswered."""
+    """The claims about programs pass their gate, and none is left unanswered."""
     MODELS_LINKED = "models-linked"
     """Each model that is relied upon agrees with the program."""
     FORMAL_METHODS = "formal-methods"
@@ -58,7 +59,7 @@ class Query(StrEnum):
     REVIEWS = "reviews"
     """Each node has a guarantee that a person reviewed."""
     MUTANTS = "mutants"
-    """A score of mutants is recorded for some method of each node of high criticality."""
+    """A mutation score is recorded for some method of each node of high criticality."""
     MONITORS = "monitors"
     """Recorded runs were judged by monitors."""
     HAZARDS = "hazards"
@@ -87,7 +88,7 @@ class Objective:
 
 @dataclass(frozen=True, slots=True)
 class ObjectiveView:
-    """An objective and how the case stands to it; `why`: what is missing, or what it needs from elsewhere."""
+    """An objective and its state in the case; `why`: what is missing, or what it needs from elsewhere."""
 
     id: str
     text: str
@@ -118,7 +119,8 @@ def standard_view(
     views: Sequence[ObligationView],
     hazards: Sequence[HazardView],
 ) -> StandardView:
-    """The objectives of a standard at a level, held against a case. `gates`: all but that of the standard itself."""
+    """The objectives of a standard at a level, compared with a case. `gates`: all except that of the standard
+    itself."""
     title, objectives = standards()[name]
     queries = _Queries(gates, requirements, views, hazards)
     found = []
@@ -151,7 +153,7 @@ class _Queries:
         self.high = [v for v in self.guarantees if v.criticality == "high"]
 
     def missing(self, query: Query) -> str:
-        """What is missing for an answer of yes; empty where nothing is."""
+        """What is missing for the answer yes; empty if nothing is."""
         match query:
             case Query.VALIDATED:
                 return self.of_requirements("not validated", lambda r: r.validated)
@@ -226,7 +228,7 @@ class _Queries:
         return _named("models that no program was compared with", sorted(alone))
 
     def compared(self, view: ObligationView) -> bool:
-        """Whether the node's program answers as one of the models that support a guarantee."""
+        """Whether the node's program agrees with one of the models that support a guarantee."""
         found = (agrees(self.views, view.obligation, r.method) for r in view.records if weigh(r).support)
         return any(status is not None and status.supports for status in found)
 

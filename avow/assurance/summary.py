@@ -98,8 +98,8 @@ def open_items(
 
 
 def _failed_attempts(views: Sequence[ObligationView]) -> Iterable[OpenItem]:
-    """A planned method that failed where another one decides the status: without this the claim's own line would hide
-    that one of two methods never gave an answer. Told once for each failure, whatever the number of claims."""
+    """A planned method that failed while another one decides the status: otherwise the claim's own line would hide that
+    one of two methods never gave an answer. Reported once for each failure, whatever the number of claims."""
     told: dict[tuple[str, str], list[ObligationView]] = {}
     for view in views:
         if view.status is not Status.ERROR and not view.advice:
@@ -115,8 +115,8 @@ def _failed_attempts(views: Sequence[ObligationView]) -> Iterable[OpenItem]:
 
 
 def worst_first(names: Iterable[str], statuses: Mapping[str, Status]) -> tuple[str, ...]:
-    """The causes of a failure in the order in which a reader should meet them: what has no status of its own last, and
-    of two alike the contract's fault first, as nothing follows from a contract that cannot be met."""
+    """The causes of a failure in reading order: those without a status of their own last, and of two equal ones the
+    contract's fault first, as nothing follows from a contract that cannot be met."""
     rank = {status: at for at, status in enumerate(_WORST_FIRST)}
 
     def key(name: str) -> tuple[int, bool]:
@@ -127,7 +127,7 @@ def worst_first(names: Iterable[str], statuses: Mapping[str, Status]) -> tuple[s
 
 def _given_up(view: ObligationView) -> Iterable[OpenItem]:
     """A refutation of the claim as it is now, by a method that the plan no longer uses for it, or with a file that the
-    method no longer reads: that does not refute the refutation."""
+    method no longer reads: neither change refutes the refutation."""
     for item in view.evidence:
         record = item.entry.evidence
         if record.obligation_digest != view.obligation.digest or not weigh(record).refuted:
@@ -140,7 +140,7 @@ def _given_up(view: ObligationView) -> Iterable[OpenItem]:
 
 
 def _no_longer_read(refuting: Evidence, counting: Iterable[Evidence]) -> list[str]:
-    """The files that a method read when it refuted a claim, and leaves out now, where all others are as they were."""
+    """The files that a method read when it refuted a claim and no longer reads, if all others are unchanged."""
     same = (r for r in counting if r.method == refuting.method and r.inputs.items() < refuting.inputs.items())
     return sorted(next((refuting.inputs.keys() - now.inputs.keys() for now in same), ()))
 
@@ -159,7 +159,7 @@ def _open(view: ObligationView, said: Mapping[str, str]) -> OpenItem:
 
 
 def _summary(view: ObligationView) -> str:
-    """The most telling evidence in a line: a refutation's counterexample, else the last attempt's summary."""
+    """The decisive evidence in a line: a refutation's counterexample, else the last attempt's summary."""
     if view.obligation.unwritten:
         return "nothing: it is a draft's placeholder"
     refuting = [r for r in view.records if weigh(r).refuted]
@@ -193,7 +193,7 @@ def _vacuous(view: ObligationView) -> OpenItem:
 
 
 def limits(facts: Facts, views: Sequence[ObligationView]) -> tuple[tuple[str, str], ...]:
-    """What bounds the answers: for reproduction, and for judging what a bounded answer is worth."""
+    """The limits of the answers: for reproduction, and for judging the value of a bounded answer."""
     bounds: dict[tuple[str, str, str], list[str]] = {}
     for view in views:
         for record in view.records:
@@ -205,7 +205,7 @@ def limits(facts: Facts, views: Sequence[ObligationView]) -> tuple[tuple[str, st
 
 
 def _short(value: object) -> str:
-    """A mapping by its keys (files and their digests stand with the evidence)."""
+    """A mapping by its keys (files and their digests are listed with the evidence)."""
     if isinstance(value, bool):
         return "yes" if value else "no"
     return ", ".join(map(str, value)) if isinstance(value, dict | list | tuple) else str(value)
@@ -214,7 +214,7 @@ def _short(value: object) -> str:
 def not_shown(
     facts: Facts, views: Sequence[ObligationView], requirements: Sequence[RequirementView]
 ) -> tuple[str, ...]:
-    """What nobody should read into this case."""
+    """The statements that this case does not support."""
     guarantees = [v for v in views if v.obligation.kind is Kind.GUARANTEE]
     told = [v for v in views if v.obligation.kind in (Kind.GUARANTEE, Kind.REQUIREMENT)]
 

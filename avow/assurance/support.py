@@ -1,4 +1,5 @@
-"""Who rests on whom: the claims of a case as `Claim`s, from names in the plan and premises of the calculus."""
+"""The dependencies between claims: the claims of a case as `Claim`s, from names in the plan and premises of the
+calculus."""
 
 from __future__ import annotations
 
@@ -17,7 +18,7 @@ from avow.system.plan import Requirement
 
 
 class Names:
-    """What the names that a plan or a backend uses stand for."""
+    """The claims that the names in a plan or a backend denote."""
 
     def __init__(self, facts: Facts) -> None:
         self.obligations = {o.id: o for o in facts.obligations}
@@ -51,7 +52,7 @@ class Names:
             self.saying.setdefault((o.digest, *o.local_id.split("/")[:2]), []).append(o)
 
     def claims(self, name: str) -> tuple[str, ...] | None:
-        """The claims that a name of the plan stands for; None where it stands for nothing."""
+        """The claims that a name of the plan denotes; None if it denotes nothing."""
         if name in self.derivations:
             return (derivation_claim(name),)
         if name in self.requirements:
@@ -66,8 +67,8 @@ class Names:
         return (self.local[name],) if name in self.local else None
 
     def discharging(self, hypothesis: Hypothesis) -> str | None:
-        """The claim that says what a hypothesis says; None where none does. A claim of the same name that says
-        something else is not it; of several that say it, the one of that name is meant."""
+        """The claim that states what a hypothesis states; None if there is none. A claim of the same name with another
+        meaning does not match; of several with the same meaning, the one of that name is chosen."""
         if hypothesis.kind is HypothesisKind.ASSUMPTION:
             return assumption_claim(hypothesis)
         saying = self.saying.get((hypothesis.digest, *hypothesis.name.split("/")[:2]), [])
@@ -75,8 +76,8 @@ class Names:
         return next((o.id for o in (*named, *saying)), None)
 
     def behind(self, name: str) -> tuple[str, ...]:
-        """What discharges the assumptions of the nodes that a name of the plan stands for: a node keeps its guarantees
-        only where these are met, whoever ties them to a requirement."""
+        """The claims that discharge the assumptions of the nodes that a name of the plan denotes: a node keeps its
+        guarantees only if these are met, by whatever derivation a requirement uses them."""
         owners, seen, found = [name], set[str](), dict[str, None]()
         while owners:
             owner = owners.pop()
@@ -99,13 +100,13 @@ def _belongs(obligation: str, requirement: str) -> bool:
 
 
 def assumption_claim(hypothesis: Hypothesis) -> str:
-    """One for each thing supposed, whatever rests on it."""
+    """One claim for each assumption, whatever rests on it."""
     return f"assumption:{hypothesis.name}:{hypothesis.digest[:12]}"
 
 
 def assumption_claims(hypotheses: Iterable[Hypothesis], accepted: Iterable[Handled]) -> Iterable[Claim]:
-    """What a person has to accept: justified where somebody has (``accepted: {obligation: agent/assumption/…, verdict:
-    missing, …}``) and still does, else missing."""
+    """The assumptions that a person has to accept: justified if a person has (``accepted: {obligation:
+    agent/assumption/…, verdict: missing, …}``) and still does, else missing."""
     taken = [f for f in accepted if f.how == "accepted" and f.verdict == Status.MISSING and not f.expired]
     found = {h: None for h in hypotheses if h.kind is HypothesisKind.ASSUMPTION}
     for hypothesis in found:
@@ -122,9 +123,9 @@ def obligation_claim(
     link: Link | None,
     names: Names,
 ) -> Claim:
-    """An obligation stands on its evidence; a guarantee also on its node's contract being worth verifying; and either
-    on what its evidence rests on. Within limits it is `checked` at most. A hypothesis that no claim of the case
-    discharges is an error; a remark in words is one, also where its words are a claim's id."""
+    """An obligation rests on its evidence; a guarantee also on the sanity of its node's contract; and both on what the
+    evidence rests on. Within limits it is `checked` at most. A hypothesis that no claim of the case discharges is an
+    error; a remark in words is a hypothesis too, even if its words are a claim's id."""
     rests: list[str] = []
     if obligation.kind is Kind.GUARANTEE:
         rests += names.foundation.get(obligation.node, [])
@@ -145,7 +146,7 @@ def obligation_claim(
 
 
 def requirement_support(requirement: Requirement, names: Names) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """The claims that a requirement rests on, and the names under `supported_by` that stand for nothing."""
+    """The claims that a requirement rests on, and the names under `supported_by` that denote nothing."""
     rests: list[str] = list(names.own.get(requirement.id, ()))
     unknown = []
     for name in requirement.supported_by:
@@ -161,7 +162,7 @@ def requirement_support(requirement: Requirement, names: Names) -> tuple[tuple[s
         and not requirement.supported_by
         and not any(names.obligations[o].clauses for o in names.own.get(requirement.id, ()))
     ):
-        # it was settled on the contracts; which of them, nobody said: then it rests on all
+        # it was discharged on the contracts without naming which: then it rests on all
         rests += names.every_guarantee()
     return tuple(dict.fromkeys(rests)), tuple(unknown)
 
@@ -193,19 +194,19 @@ def derivation_claims(facts: Facts, names: Names) -> Iterable[Claim]:
 
 
 def open_conditions(derivation: Derivation, names: Names) -> tuple[str, ...]:
-    """What a derivation is conditional on without an obligation that would settle it."""
+    """The conditions of a derivation that have no obligation to discharge them."""
     return tuple(text for text in derivation.conditional if text not in names.local)
 
 
 def criticality(obligation: Obligation, facts: Facts) -> str:
-    """The node's; what belongs to no single node is as critical as the most critical of them."""
+    """The node's; a claim of no single node is as critical as the most critical node."""
     known, highest = _criticalities(facts.nodes)
     return known.get(obligation.node, highest if obligation.node == SYSTEM_LEVEL else "medium")
 
 
 @by_identity(16)
 def _criticalities(nodes: tuple[NodeView, ...]) -> tuple[Mapping[str, str], str]:
-    """Of each node, and the highest."""
+    """The criticality of each node, and the highest."""
     known = {node.name: node.criticality for node in nodes}
     present = set(known.values())
     return known, next((level for level in ("high", "medium", "low") if level in present), "medium")

@@ -91,7 +91,7 @@ def trace(case: Case) -> tuple[Row, ...]:
                 stack += [(below, through) for below in reversed(requirements[claim].rests_on)]
             elif claim in views:
                 rows += _rows(views[claim], through)
-                # a guarantee is worth what its node's contract is worth: what shows that is part of the trace
+                # a guarantee is worth no more than its node's contract, so claims about the contract are traced too
                 stack += [(below, through) for below in reversed(views[claim].rests_on)]
             else:
                 rows.append(Row(derivation=through, obligation=claim, remark="orphan: no such claim"))
@@ -123,7 +123,7 @@ def trace(case: Case) -> tuple[Row, ...]:
         rows[at] = replace(row, hazards=", ".join(v.hazard.id for v in case.hazards if v.hazard.id in found))
     for hazard in case.hazards:
         for m in hazard.mitigations:
-            if not m.claims and m.name not in named:  # what the graph keeps away
+            if not m.claims and m.name not in named:  # a mitigation by the dataflow graph alone
                 status = Status.ARGUED if m.level.holds else Status.MISSING
                 rows.append(Row(hazards=hazard.hazard.id, obligation=m.name, status=status))
         if not hazard.mitigations:
@@ -143,7 +143,7 @@ def _rows(view: ObligationView, derivation: str, remark: str = "") -> Iterable[R
         yield replace(
             start,
             method=record.method,
-            verdict=weigh(record).status.value,  # what it counts as: a pass that is vacuous shows nothing
+            verdict=weigh(record).status.value,  # the status that it counts as: a vacuous pass shows nothing
             link=record.link.value,
             tool=record.tool_told,
             evidence=item.entry.hash[:12],
@@ -154,7 +154,7 @@ def _rows(view: ObligationView, derivation: str, remark: str = "") -> Iterable[R
 
 
 def to_csv(rows: Iterable[Row]) -> str:
-    """As CSV (RFC 4180). A cell that a spreadsheet would take for a formula gets an apostrophe before it."""
+    """As CSV (RFC 4180). A cell that a spreadsheet would read as a formula gets a leading apostrophe."""
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\r\n")
     writer.writerow(COLUMNS)

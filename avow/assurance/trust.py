@@ -1,4 +1,4 @@
-"""What a reader has to trust for the case, each part with what was done about it."""
+"""The parts that a reader has to trust for the case, each with its mitigation."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from avow.base.plain import count, listed
 def trust_lines(
     proofs: Sequence[ProofView], kernel: KernelRun, assumptions: Sequence[Assumption], run: str
 ) -> tuple[TrustLine, ...]:
-    """The kernel, the solvers, the front end, tools whose word is taken, and assumptions without an owner."""
+    """The kernel, the solvers, the front end, tools whose answers are trusted, and assumptions without an owner."""
     wanted = certifiable(proofs)
     certified = [p for p in wanted if p.grade in (ProofGrade.CERTIFIED_1, ProofGrade.CERTIFIED_2)]
     twice = sum(p.grade is ProofGrade.CERTIFIED_2 for p in certified)

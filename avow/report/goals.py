@@ -270,7 +270,7 @@ class _Argument:
             below = []
             for m in view.mitigations:
                 below.append(self.mitigation(m.name, m.claims) or self.new(Sort.GOAL))
-                if not self.mitigation(m.name, m.claims):  # not in the argument's graph
+                if not self.mitigation(m.name, m.claims):  # a mitigation by the dataflow graph alone
                     label = f"{m.name} [{m.level}]"
                     others.append(Element(below[-1], Sort.GOAL, m.words, undeveloped=True, label=label))
             hazard = view.hazard
