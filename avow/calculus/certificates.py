@@ -1,7 +1,7 @@
-"""Certificates for a system's derivations and requirements, and what the kernel says of them.
+"""Certificates for a system's derivations and requirements, and the kernel's results for them.
 
-The engine's proofs are hints for `avow.calculus.finder`; certificates kept from an earlier run are tried first. What
-`avow.kernel.check` does not establish from the system as it is now is not proved, whoever says so.
+The engine's proofs are hints for `avow.calculus.finder`; certificates kept from an earlier run are tried first. A claim
+is proved only if `avow.kernel.check` establishes it from the current system.
 """
 
 from __future__ import annotations
@@ -31,12 +31,12 @@ if TYPE_CHECKING:
 
 
 POSSIBLE = frozenset({Claimed.POSSIBLE, Claimed.IMPOSSIBLE, Claimed.START})
-"""Claims that something is possible, or (of which one is enough) left no room by a node alone."""
+"""Claims that something is possible or, as an alternative, that a node alone excludes it."""
 
 
 @dataclass(slots=True)
 class Certificates:
-    """Of one system. `kept`: those of an earlier run, by scope; `made`: those that count now."""
+    """The certificates of one system. `kept`: those of an earlier run, by scope; `made`: the current ones."""
 
     composition: Composition
     kept: Mapping[str, Certificate] = field(default_factory=dict)
@@ -57,7 +57,7 @@ class Certificates:
         return self._known
 
     def known_with(self, lemmas: tuple[Written, ...]) -> Statements:
-        """The claims of the system, and those of some lemmas that can be read."""
+        """The claims of the system, and those of the lemmas that can be read."""
         if not lemmas:
             return self.known
         if lemmas not in self._extended:
@@ -67,11 +67,11 @@ class Certificates:
 
     @property
     def late(self) -> bool:
-        """Whether the clock ended a question to Z3: on a quicker machine more might be established."""
+        """Whether a Z3 query ran out of time: a faster machine might establish more."""
         return Said.LATE in self.solvers.known.values()
 
     def condition(self, goal: Goal, about: str, bounds: Bounds) -> Established | None:
-        """The assumption of a node (``agent.low``, or ``robot.agent.low`` of a node in a subsystem) in a derivation."""
+        """Establish the assumption of a node (``agent.low``; in a subsystem ``robot.agent.low``) in a derivation."""
         claim = self.claim(Claimed.ASSUMPTION, innermost(about))
         if claim is None:
             return None
@@ -89,7 +89,7 @@ class Certificates:
     def requirement(
         self, name: str, hint: Hint, bounds: Bounds, lemmas: tuple[Written, ...] = ()
     ) -> Established | None:
-        """A requirement, of the whole system."""
+        """Establish a requirement on the whole system."""
         claim = self.claim(Claimed.REQUIREMENT, name)
         if claim is None:
             return None
@@ -109,7 +109,7 @@ class Certificates:
         return self.established(self.made[scope], claim)
 
     def existence(self, name: str) -> list[Established] | None:
-        """What an obligation says to be possible (`avow.calculus.wiring`), in all its parts."""
+        """Establish everything that an obligation claims to be possible (`avow.calculus.wiring`)."""
         entries: list[Entry] = []
         for part in self.parts(name):
             tried = ((claim, attempt) for claim in part for attempt in self._examples(claim))
@@ -120,7 +120,7 @@ class Certificates:
         return self.existing(self.made[scope], name)
 
     def existing(self, certificate: Certificate | None, name: str) -> list[Established] | None:
-        """As `existence`, from a certificate."""
+        """The same as `existence`, from a certificate."""
         found = complete(
             next((one for claim in part if (one := self.established(certificate, claim)) is not None), None)
             for part in self.parts(name)
@@ -128,8 +128,8 @@ class Certificates:
         return found or None
 
     def _examples(self, claim: Statement) -> Iterator[tuple[Entry, ...]]:
-        """Certificates to try, that something is possible or left no room. First values of a loop may be there only
-        where the environment is as it is assumed to be: without, if that is enough."""
+        """Certificates to try for the claim that something is possible or excluded. A loop may have first values only
+        under the environment assumptions; they are left out if they are not needed."""
         match claim.kind:
             case Claimed.IMPOSSIBLE:
                 yield (Entry(How.SHOWN, "", claim.digest, step=Question()),)
@@ -143,7 +143,7 @@ class Certificates:
                 yield (Entry(How.POSSIBLE, "", claim.digest),)
 
     def parts(self, name: str) -> list[list[Statement]]:
-        """The claims of an obligation that something is possible: of each part, those of which one is enough."""
+        """The parts of an obligation that something is possible: for each, the claims of which one is enough."""
         parts: dict[str, list[Statement]] = {}
         for claim in self.known.every:
             if claim.kind in POSSIBLE and _possible_name(claim) == name:
@@ -151,12 +151,12 @@ class Certificates:
         return list(parts.values())
 
     def kept_for(self, scope: str, kind: Claimed, name: str) -> Established | None:
-        """What the kernel says of a claim from the certificate of an earlier run."""
+        """The kernel's result for a claim from the certificate of an earlier run."""
         claim = self.claim(kind, name)
         return self.established(self.kept.get(scope), claim) if claim is not None else None
 
     def established(self, certificate: Certificate | None, claim: Statement) -> Established | None:
-        """What the kernel says of a claim, from a certificate that has an entry for it."""
+        """The kernel's result for a claim, from a certificate that has an entry for it; otherwise None."""
         if certificate is None:
             return None
         kernel = self._kernels.get(certificate.scope)
@@ -169,14 +169,14 @@ class Certificates:
         how = How.POSSIBLE if claim.kind in (Claimed.POSSIBLE, Claimed.START) else How.SHOWN
         for i in self._places[certificate.scope].get((how, claim.node, claim.digest), ()):
             try:
-                # of an assumption, what its questions name is told as claims of their own
+                # for an assumption, the entries that its questions name are reported as separate claims
                 return kernel.establish(i, alone=claim.kind is Claimed.ASSUMPTION)
             except Refused:
                 continue
         return None
 
     def claim(self, kind: Claimed, name: str) -> Statement | None:
-        """The claim of that name as it is now; None where it has no text."""
+        """The current claim of that name; None if it has no text."""
         if not self._named:
             self._named = {(s.kind, s.called): s for s in self.known.every}
         return self._named.get((kind, name))
@@ -220,14 +220,14 @@ def requirement_scope(name: str) -> str:
 
 
 def scope_of(claim: Statement) -> str | None:
-    """The scope of the certificate of a claim about the whole system; None of another."""
+    """The scope of the certificate of a claim about the whole system; None for another claim."""
     match claim.kind:
         case Claimed.REQUIREMENT:
             return requirement_scope(claim.name)
         case Claimed.POSSIBLE | Claimed.IMPOSSIBLE | Claimed.START:
             return existence_scope(_possible_name(claim))
         case Claimed.ASSUMPTION | Claimed.GUARANTEE | Claimed.ENVIRONMENT | Claimed.INITIAL | Claimed.DEFINITION:
-            # a clause or a formula of the plan: its derivation's, or none
+            # a clause or a formula of the plan: in its derivation's scope, or in none
             return None
         case _:
             assert_never(claim.kind)
@@ -244,7 +244,7 @@ def existence_scope(name: str) -> str:
 
 
 def _pruned(certificate: Certificate, goal: Statement) -> Certificate:
-    """The entries that a claim rests on, and no others."""
+    """The certificate with only the entries that a claim depends on."""
     wanted = (How.SHOWN, goal.node, goal.digest)
     at = next((i for i, e in enumerate(certificate.entries) if (e.how, e.node, e.digest) == wanted), None)
     if at is None:
@@ -275,13 +275,13 @@ def _hint(settled: Settled) -> Hint | None:
 
 
 def hint_of(first: Case, later: Case) -> Hint:
-    """The hint of an induction."""
+    """The hint for a proof by induction."""
     initials = tuple(label.removeprefix("initial ") for label in first.needed if label.startswith("initial "))
     return Hint(labels(later.needed), labels(first.needed), initials, later.depth)
 
 
 def labels(needed: Iterable[str]) -> tuple[tuple[str, int], ...]:
-    """The engine's labels as clauses with how many steps before; initial values apart."""
+    """The engine's labels as clauses with the number of steps before, without initial values."""
     found = []
     for label in needed:
         if label.startswith("initial "):

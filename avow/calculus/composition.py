@@ -1,4 +1,4 @@
-"""A system's derivations, with what is computed for them once."""
+"""A system's derivations, and the results that are computed once for them."""
 
 from __future__ import annotations
 
@@ -40,8 +40,9 @@ from avow.system.plan import ComposeGoal, Endpoint, Subsystem, System
 
 @dataclass(slots=True)
 class Meanings:
-    """Digests of what composition claims are about: nodes with all that flows into them, and the plan's formulas; names
-    of clauses, layout and comments do not count. Computed once for a system (as a Merkle tree over its loops)."""
+    """Digests of what composition claims depend on: nodes with everything that flows into them, and the plan's
+    formulas, but not names of clauses, layout or comments. Computed once for a system (as a Merkle tree over its
+    loops)."""
 
     frame: Frame
     _nodes: dict[str, str] = field(default_factory=dict)
@@ -63,7 +64,7 @@ class Meanings:
         return self._nodes[name]
 
     def cone(self, name: str, selected: frozenset[str]) -> str:
-        """A node and every selected node from which values flow to it, at whatever step."""
+        """A node and every selected node from which values flow to it, at any step."""
         if selected not in self._cones:
             self._cones[selected] = self._all_cones(selected)
         return self._cones[selected][name]
@@ -91,7 +92,7 @@ class Meanings:
         return found
 
     def initial(self, node: str) -> str:
-        """What the plan says of a node's outputs before the first step."""
+        """The plan's conditions on a node's outputs before the first step."""
         return digest(*self.frame.initials(frozenset({node})).values())
 
     def environment(self, ports: Iterable[str] | None = None) -> str:
@@ -108,10 +109,10 @@ class Meanings:
 
 @dataclass(slots=True)
 class Composition:
-    """A system's derivations: of each goal of the plan, and of the whole system."""
+    """A system's derivations: for each goal of the plan, and for the whole system."""
 
     frame: Frame
-    """Every node by itself."""
+    """The frame in which every node is a node of its own."""
     goals: tuple[Goal, ...]
     """Subsystems first, those inside others before these."""
     meanings: Meanings
@@ -122,9 +123,9 @@ class Composition:
     around: Mapping[str, str] = field(default_factory=dict)
     """Node or subsystem → the subsystem that it is directly in."""
     told: Told | None = field(default=None, compare=False)
-    """Called with each side condition of a goal as soon as it is settled."""
+    """Called with each side condition of a goal as soon as it is answered."""
     claims: Mapping[str, Mapping[SideCondition, Claim]] = field(default_factory=dict, compare=False)
-    """Goal → what is claimed of its side conditions, where only some of it is asked for."""
+    """Goal → the claims of its side conditions, if only some of them are requested."""
     _level_meanings: dict[str, Meanings] = field(default_factory=dict)
     _answers: dict[str, Answers] = field(default_factory=dict)
     _machine: Machine | None = None
@@ -139,7 +140,7 @@ class Composition:
         return next(goal for goal in self.goals if goal.name == name)
 
     def settled(self, goal: Goal, bounds: Bounds) -> Answers:
-        """The goal's side conditions, settled once."""
+        """The goal's side conditions, checked once."""
         if goal.name not in self._answers:
             self._answers[goal.name] = settle(self.frame_of(goal), goal, bounds, self.told, self.claims.get(goal.name))
         return self._answers[goal.name]
@@ -158,7 +159,7 @@ class Composition:
 
     @property
     def certificates(self) -> Certificates:
-        """What the kernel has established of these derivations."""
+        """The kernel's results for these derivations."""
         if self._certificates is None:
             self._certificates = Certificates(self, solvers=Solvers(z3=ask_once))
         return self._certificates
@@ -168,7 +169,7 @@ class Composition:
         return self.levels.get(goal.name, self.frame)
 
     def meanings_of(self, goal: Goal) -> Meanings:
-        """Digests of what a goal is about."""
+        """Digests of what a goal depends on."""
         level = self.levels.get(goal.name)
         if level is None:
             return self.meanings
@@ -177,13 +178,14 @@ class Composition:
         return self._level_meanings[goal.name]
 
     def leaves(self, goal: Goal, nodes: Iterable[str]) -> tuple[str, ...]:
-        """The nodes of the contract that some nodes of a goal are made of."""
+        """The contract's nodes that some nodes of a goal consist of."""
         level = self.levels.get(goal.name)
         return tuple(nodes) if level is None else level.leaves(nodes)
 
     def where(self, node: str, clause: str) -> tuple[Goal, ClauseName] | None:
-        """The derivation that shows an assumption of a node, and what it is called there: the node's subsystem, or the
-        one around it where that carries it outward, …, or the whole system; None where it stays assumed."""
+        """The derivation that shows an assumption of a node, and the assumption's name there: that of the node's
+        subsystem, of an enclosing one if the inner one carries it outward, or of the whole system; None if it stays
+        assumed."""
         about = ClauseName(node, clause)
         while (name := self.around.get(about.node)) is not None:
             goal = self.goal(name)
@@ -194,13 +196,13 @@ class Composition:
         return (whole, about) if about in shown else None
 
     def known(self, goal: Goal) -> Mapping[SideCondition, Settled]:
-        """The side conditions of a goal that have been settled; none if it was not asked for."""
+        """The side conditions of a goal that have been answered; empty if the goal was not checked."""
         answers = self._answers.get(goal.name)
         return answers.settled if answers is not None else {}
 
     def fallen(self, goal: Goal, behind: str = "") -> tuple[str, ...]:
-        """The side conditions of a goal that have been settled and do not hold: of a node and of those from which
-        values flow to it, or of all."""
+        """The side conditions of a goal that have been answered and do not hold: those of a node and of the nodes from
+        which values flow to it, or all."""
         graph, nodes = self.frame_of(goal).graph, {behind: None} if behind else dict.fromkeys(goal.nodes)
         for node in (waiting := list(nodes)):
             waiting += (more := [p for p in graph.providers(node) if p not in nodes])
@@ -211,7 +213,7 @@ class Composition:
         )
 
     def machine(self, seed: int = 0, of: str = "") -> Machine:
-        """The composed contracts as a transition system, made once; beside them what is remembered `of` a requirement.
+        """The composed contracts as a transition system, made once; with the cells `of` a requirement, if it has any.
         Raises CannotRun."""
         if of in self.frame.observed:
             return Machine(world(self.frame), seed, of)
@@ -220,8 +222,8 @@ class Composition:
         return self._machine
 
     def assumed(self, of: str = "") -> dict[str, Term]:
-        """What is assumed of the system's environment: by the plan, or by a node of inputs that no node provides; with
-        what is remembered for a requirement (`of`)."""
+        """The assumptions about the system's environment, by the plan or by a node about inputs that no node provides;
+        with the definitions of cells, also for a requirement (`of`)."""
         frame, found = self.frame, dict[str, Term]()
         for node in frame.system.contract.nodes:
             for clause in node.assumptions:
@@ -231,7 +233,7 @@ class Composition:
         return found | frame.environment() | frame.memory(of=of)
 
     def left_to_environment(self) -> Iterator[tuple[ClauseName, tuple[str, ...]]]:
-        """The assumptions of nodes that speak of environment inputs alone and stay assumed, with these inputs."""
+        """The assumptions of nodes that mention only environment inputs and stay assumed, with these inputs."""
         flat = self.frame
         for name in dict.fromkeys(ClauseName(*innermost(str(n)).split(".")) for n in self.whole.root.assumed):
             ports = tuple(v.name for v in ports_of(flat.system.contract.node(name.node).clause(name.clause).formula))
@@ -240,7 +242,7 @@ class Composition:
 
     @property
     def surroundings(self) -> Node:
-        """The environment's inputs as a node of which all is assumed that is assumed of them together."""
+        """A node with the environment's inputs and all assumptions about them."""
         if self._surroundings is None:
             flat, contract = self.frame, self.frame.system.contract
             said = [
@@ -250,31 +252,31 @@ class Composition:
                 said.append((name.node, str(name), contract.node(name.node).clause(name.clause).formula))
             ports: dict[Variable, None] = {}
             clauses: dict[str, Term] = {}
-            for node, label, formula in sorted(said, key=lambda each: each[1]):  # the order of nodes means nothing
+            for node, label, formula in sorted(said, key=lambda each: each[1]):  # the order of nodes does not matter
                 entries = {
                     v: replace(v, name=flat.entry(node, v.name).removeprefix("in."), span=None)
                     for v in ports_of(formula)
                 }
                 ports |= dict.fromkeys(entries.values())
                 clauses[label] = substitute(formula, entries)
-            if any(map(histories, clauses.values())):  # else each step may be as the first
+            if any(map(histories, clauses.values())):  # otherwise each step may be like the first
                 clauses |= {c.name: c.formula for c in self._unchanging({v.name: v for v in ports})}
             inputs = tuple(Port(Role.INPUT, v.name, v.sort, str(v.sort)) for v in ports)
             assumed = (Clause(ClauseKind.ASSUMPTION, label, 0, f) for label, f in clauses.items())
-            paced = contract.nodes if one_pace(contract.nodes) else ()  # else their steps are not the same steps
+            paced = contract.nodes if one_pace(contract.nodes) else ()  # otherwise their steps differ
             paces = {digest(g.formula): g for node in paced for g in node.guarantees if g.pace is not None}
             self._surroundings = Node("environment", inputs, (), (), tuple(assumed), tuple(paces.values()))
         return self._surroundings
 
     def _unchanging(self, entries: Mapping[str, Variable]) -> Iterator[Clause]:
-        """For each of these inputs of the environment that is constant, that it never changes."""
+        """For each constant among these environment inputs: the assumption that it never changes."""
         for name, variable in entries.items():
             if {f"in.{name}", name} & self.frame.constants and not isinstance(variable.sort, FunctionSort):
                 same = Not(History(Past.CHANGED, (variable,), BOOL))
                 yield Clause(ClauseKind.ASSUMPTION, f"constant {name}", 0, same)
 
     def lasting(self, bounds: Bounds) -> SanityResult:
-        """Whether an environment can meet for ever all that is assumed of it."""
+        """Whether an environment can satisfy all assumptions about it for ever."""
         if self._lasting is None:
             node = self.surroundings
             given = interpretation(node, self.frame.system.plan.scenario)
@@ -283,8 +285,8 @@ class Composition:
         return self._lasting
 
     def excluded_over_runs(self, bounds: Bounds) -> tuple[str, ...]:
-        """The guarantees (``node.name``) whose condition comes about in no run of the environment that is assumed,
-        though in some run of their node alone. Only where other steps matter: `EnvironmentQuestion` asks about one."""
+        """The guarantees (``node.name``) whose condition arises in no run of the assumed environment, but in some run
+        of their node alone. Only if other steps matter: `EnvironmentQuestion` checks single steps."""
         if self._excluded is None:
             nodes = self.frame.system.contract.nodes
             self._excluded = tuple(f"{n.name}.{g}" for n in nodes if not n.relay for g in self._never_met(n, bounds))
@@ -327,12 +329,12 @@ class Composition:
 
 @by_identity(2)
 def composed(system: System) -> Composition:
-    """As `compose`, once for a system: for those who read it and settle nothing."""
+    """The same as `compose`, cached: for callers that only read it."""
     return compose(system)
 
 
 def compose(system: System) -> Composition:
-    """The derivations of a system. Pure. Raises Rejected for a plan whose formulas are wrong."""
+    """The derivations of a system. Pure. Raises Rejected if the plan's formulas are wrong."""
     return composed_over(frame(system))
 
 
@@ -372,7 +374,7 @@ def composed_over(flat: Frame) -> Composition:
     found = Composition(flat, tuple(goals.values()), Meanings(flat), levels, nodes, parents(system.plan))
     if any(set(goal.nodes) == set(nodes) and not _left_open(found, goal) for goal in goals.values()):
         return found
-    # a rule that the plan names may leave assumed what a node provides: that is shown here
+    # a rule that the plan names may leave assumptions about provided values: these are shown here
     name = WHOLE
     while name in goals:
         name += "_"
@@ -381,12 +383,12 @@ def composed_over(flat: Frame) -> Composition:
 
 
 def _taken_together(flat: Frame, nodes: frozenset[str]) -> bool:
-    """Whether claims about these nodes may use values of several of them as of one step: a value of the step before is
-    read, or a requirement of the whole system speaks of several nodes."""
+    """Whether claims about these nodes may use values of several of them at one step: a value of the step before is
+    read, or a requirement of the whole system mentions several nodes."""
     if any(e.delayed and {e.source.node, e.target.node} <= nodes for e in flat.graph.edges):
         return True
     if len(nodes) > 1 and flat.remembering(nodes):
-        return True  # what was remembered is of one step
+        return True  # cells combine values of one step
     if nodes != frozenset(flat.graph.nodes):
         return False
     if len(nodes) > 1 and flat.observed:
@@ -396,7 +398,7 @@ def _taken_together(flat: Frame, nodes: frozenset[str]) -> bool:
 
 
 def _left_open(composition: Composition, goal: Goal) -> bool:
-    """Whether a derivation leaves something assumed of values that a node provides."""
+    """Whether a derivation leaves an assumption about values that a node provides."""
     frame = composition.frame
     for name in goal.root.assumed:
         node, clause = innermost(str(name)).split(".")
@@ -408,13 +410,13 @@ def _left_open(composition: Composition, goal: Goal) -> bool:
 
 
 def asked(system: System, goal: str) -> ComposeGoal | Subsystem | None:
-    """What the plan says of a derivation."""
+    """The plan's entry for a derivation."""
     goals: tuple[ComposeGoal | Subsystem, ...] = (*system.plan.compose, *system.plan.subsystems)
     return next((entry for entry in goals if entry.name == goal), None)
 
 
 def argument(composition: Composition, goal: str, key: str) -> str:
-    """The plan's reason for a hypothesis of a goal, or nothing."""
+    """The plan's reason for a hypothesis of a goal, or empty."""
     entry = asked(composition.frame.system, goal)
     if entry is not None and isinstance(entry.options.data, dict):
         given = entry.options.data.get(key)

@@ -1,4 +1,4 @@
-"""Where a scenario's values cut runs off: which outputs of a node does its contract allow that were not explored?"""
+"""Detects where a scenario cuts runs off: outputs that a node's contract allows and that were not explored."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ from avow.solving.z3_module import z3
 
 @new_session()
 def first_cut(node: Answerer, deadline: float) -> str:
-    """In words, the first inputs at which an allowed output of a node was not looked at; nothing where all were.
+    """In words, the first inputs at which an allowed output of a node was not explored; empty if all were.
 
-    An answer that the scenario leaves out may lead to unexplored steps. The solver knows the contract without the
-    scenario: if it finds another output, or cannot exclude one, the search is not exhaustive. The question covers
-    functions and sequences at the points at which they were decided, and no relations: the scenario gives their points.
+    An output that the scenario leaves out may lead to unexplored steps. The solver has the contract without the
+    scenario: if it finds another output, or cannot exclude one, the search is not exhaustive. The query covers
+    functions and sequences at the points at which they were decided, but no relations: the scenario gives their points.
     """
     ports = [port for port in node.others.values() if is_restricted(node, port)]
     if not ports:
@@ -45,8 +45,8 @@ def first_cut(node: Answerer, deadline: float) -> str:
 
 
 class _Written:
-    """A node's guarantees in Z3, of many inputs. Each is translated once for equal values of the inputs that it
-    mentions, and each value once: translation takes most of the time of these questions."""
+    """A node's guarantees in Z3, for many inputs. Each is translated once for equal values of the inputs that it
+    mentions, and each value once: translation takes most of the time of these queries."""
 
     def __init__(self, node: Node) -> None:
         self.node = node
@@ -58,7 +58,7 @@ class _Written:
         self._clauses: dict[object, object] = {}
 
     def given(self, solver: z3.Solver, inputs: Values) -> dict[Variable, Meaning]:
-        """As `meanings_of`."""
+        """The same as `meanings_of`, with translated values reused."""
         meanings: dict[Variable, Meaning] = {}
         for variable, value in by_variable(self.node, inputs).items():
             if is_open(value):
@@ -80,7 +80,7 @@ class _Written:
 
 
 def _other(written: _Written, ports: list[Port], inputs: Values, found: tuple[Values, ...], free: bool) -> str | None:
-    """An output beside the ones found, as far as it is known; None if there is none."""
+    """Another output than those found, in words as far as known; None if there is none."""
     translator = written.translator
     solver = z3.Solver(ctx=translator.context)
     try:
@@ -94,7 +94,8 @@ def _other(written: _Written, ports: list[Port], inputs: Values, found: tuple[Va
 
 
 def another_first(node: Answerer, port: Port, condition: Term, inputs: Values, found: tuple[Value, ...]) -> bool:
-    """Whether an initial condition allows a value beside the ones found, as far as is known, its inputs being these."""
+    """Whether an initial condition allows another value than those found for these inputs; true if the solver cannot
+    tell."""
     translator = Translator()
     solver = z3.Solver(ctx=translator.context)
     try:
@@ -109,7 +110,7 @@ _UNDECIDED = ", as far as the solver can tell"
 
 
 def _beside(translator: Translator, solver: z3.Solver, ports: list[Port], found: tuple[Values, ...]) -> str | None:
-    """An output that the solver's facts allow beside the ones found, in words; None if there is none."""
+    """Another output than those found that the solver's facts allow, in words; None if there is none."""
     for answer in {tuple((p.name, key(answer[p.name])) for p in ports): answer for answer in found}.values():
         solver.add(z3.Or([z3.Not(z3.And(_known(translator, p, answer[p.name]))) for p in ports]))
     answered = put(translator, solver, CUT_EFFORT).status
@@ -124,7 +125,7 @@ def _beside(translator: Translator, solver: z3.Solver, ports: list[Port], found:
 
 
 def _known(translator: Translator, port: Port, value: Value) -> list[object]:
-    """That an output has this value, as far as it is decided."""
+    """Z3 facts: the output has this value, as far as it is decided."""
     if is_open(value) or isinstance(port.sort, FunctionSort):
         return decided(translator, port.variable, value)
     return [translator.variable(port.variable) == translator.value(value, port.sort)]

@@ -1,4 +1,4 @@
-"""Derivations: rule instances nested into a tree, as the paper writes them. Pure data; nothing here asks a solver.
+"""Derivations: rule instances nested into a tree, as the paper writes them. Pure data; nothing here calls a solver.
 
 The rules are those of the paper's section "Calculus for Combining Node Specifications": R1 sequence, R2 branching
 outputs, R3 union of inputs, R4 loops. Their soundness is machine-checked in `proofs/` (Dafny, over traces); R4 is
@@ -20,7 +20,7 @@ from avow.system.plan import Edge
 
 class Rule(StrEnum):
     PREMISE = "premise"
-    """A node's own contract: what its verification shows."""
+    """A node's own contract, which its verification shows."""
     R1 = "R1"
     R2 = "R2"
     R3 = "R3"
@@ -33,19 +33,19 @@ class LoopForm(StrEnum):
     """The premise that R4 lacks as printed, in a form that makes it sound (proofs/r4.dfy)."""
 
     BOOTSTRAP = "bootstrap"
-    """No assumption in the loop depends on what comes round it: it can be entered from outside (R4_bootstrap)."""
+    """No assumption in the loop depends on fed-back values: it can be entered from outside (R4_bootstrap)."""
     INITIAL = "initial"
     """An initial value satisfies the assumptions, and one round of the loop keeps them (R4_initial, by induction)."""
     ENTERED = "entered"
     """The plan argues that the loop is entered (R4_entered)."""
     CIRCULAR = "circular"
-    """The assumptions hold up one another: refused."""
+    """The assumptions support one another circularly: refused."""
     OPEN = "open"
     """Not shown."""
 
 
 class Phase(StrEnum):
-    """At which step a side condition is about the consumer's inputs."""
+    """The steps of the consumer's inputs that a side condition is about."""
 
     SAME_STEP = "same step"
     INITIAL = "first step"
@@ -65,10 +65,10 @@ class ClauseName:
 
 @dataclass(frozen=True, slots=True)
 class SideCondition:
-    """A provider's guarantee implies the consumer's assumption: one clause of it.
+    """The providers' guarantees imply one clause of the consumer's assumption.
 
-    `providers` are the nodes whose guarantees may be used, `delayed` says that the clause speaks of values of the step
-    before, so that the first step is a case of its own. `environment` are the plan's assumptions that may be used.
+    `providers` are the nodes whose guarantees may be used, `delayed` says that the clause mentions values of the step
+    before, so that the first step is a separate case. `environment` are the plan's assumptions that may be used.
     """
 
     consumer: str
@@ -84,9 +84,9 @@ class SideCondition:
 
 @dataclass(frozen=True, slots=True)
 class Derivation:
-    """One rule instance. `nodes` in the order of the rule's numbering: R1 first to last, R2 root then leaves, R3
-    sources then sink, R4 the loop's members. `assumed` and `guaranteed` make the conclusion:
-    all assumed ⇒ ◇ each guaranteed node's guarantees."""
+    """One rule instance. `nodes` are in the order of the rule's numbering: R1 first to last, R2 root then leaves, R3
+    sources then sink, R4 the loop's members. `assumed` and `guaranteed` form the conclusion: all assumed ⇒ ◇ each
+    guaranteed node's guarantees."""
 
     rule: Rule
     nodes: tuple[str, ...]
@@ -118,7 +118,7 @@ class Derivation:
 
 @dataclass(frozen=True, slots=True)
 class Goal:
-    """What a derivation was asked for, what came of it, and what does not fit."""
+    """A requested derivation, its result, and findings about what does not fit."""
 
     name: str
     nodes: tuple[str, ...]
@@ -129,7 +129,7 @@ class Goal:
     contract: tuple[str, ...] = ()
     """The derived contract of a subsystem in lines of text."""
     together: bool = False
-    """Whether values of several nodes may be used as of one step, beyond what the rules say."""
+    """Whether values of several nodes may be used at one step, beyond what the rules say."""
 
     @property
     def conditions(self) -> tuple[SideCondition, ...]:
@@ -144,7 +144,7 @@ class Goal:
         return self.together or any(part.rule in (Rule.R3, Rule.R4) for part in self.root.walk())
 
     def inner_first(self) -> tuple[Goal, ...]:
-        """The derivations of the subsystems inside, at whatever depth, each after those inside it; then this one."""
+        """The derivations of the subsystems inside, at any depth, each after those inside it; then this one."""
         found: dict[str, Goal] = {}
         stack: list[tuple[Goal, bool]] = [(self, False)]
         while stack:
@@ -158,13 +158,13 @@ class Goal:
 
 
 def about_memory(label: str) -> bool:
-    """Whether a hypothesis is only the definition of what is remembered, or its beginning."""
+    """Whether a hypothesis is only the definition of a cell or its initial value."""
     return label.startswith("memory ") or (label.startswith("initial ") and CELL in label)
 
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """One question put to the solver, and its answer. `needed`: labels of the hypotheses that a proof rests on."""
+    """One solver query and its answer. `needed`: labels of the hypotheses that a proof uses."""
 
     phase: Phase
     verdict: Verdict
@@ -174,14 +174,14 @@ class Case:
     reason: str = ""
     engine: str = ""
     depth: int = 1
-    """Of how many steps an induction is."""
+    """The number of steps of an induction."""
     invariant: tuple[str, ...] = ()
-    """An invariant that was found, by which it is preserved (`avow.calculus.induction`)."""
+    """An invariant that was found and makes it inductive (`avow.calculus.induction`)."""
 
 
 @dataclass(frozen=True, slots=True)
 class Settled:
-    """A side condition with its answer. `used` are the nodes whose contracts the proof rests on *at the same step*,
+    """A side condition with its answer. `used` are the nodes whose contracts the proof uses *at the same step*,
     `used_before` those at the step before."""
 
     condition: SideCondition
@@ -190,7 +190,7 @@ class Settled:
     used: tuple[str, ...] = ()
     used_before: tuple[str, ...] = ()
     circle: tuple[str, ...] = field(default=())
-    """Where the proof would be circular: the nodes on the cycle."""
+    """The nodes on the cycle, if the proof would be circular."""
 
     @property
     def needed(self) -> tuple[str, ...]:

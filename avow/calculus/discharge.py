@@ -1,10 +1,10 @@
-"""Side conditions, put to the solver: proved, refuted with a counterexample in the contract's words, or unknown.
+"""Side conditions, checked by the solver: proved, refuted with a counterexample in the contract's terms, or unknown.
 
-A consumer's assumption has to follow from what its providers guarantee (and assume: the conclusion is under that) at
-the same step, from the plan's environment assumptions, and, for a value that comes over a delayed edge, from its
+A consumer's assumption has to follow from its providers' guarantees at the same step (and their assumptions, which the
+conclusion assumes), from the plan's environment assumptions, and, for a value that comes over a delayed edge, from its
 initial value at the first step and from what held one step earlier at every later one. This is induction over steps
-and, within a step, over the order in which values flow; it is sound as long as no assumption is used, at one step, to
-prove itself. Where proofs would do that, others are looked for; where there are none, the rule is refused.
+and, within a step, over the order in which values flow. It is sound as long as no assumption is used, at one step, to
+prove itself. If proofs would do that, other proofs are searched for; without one, the rule is refused.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ Premises = tuple[tuple[str, ...], tuple[str, ...]]
 
 @dataclass(frozen=True, slots=True)
 class Bounds:
-    """Bounds on one question to the solver."""
+    """Bounds on one solver query."""
 
     effort: int = 10_000
     seed: int = 0
@@ -50,7 +50,7 @@ class Loop:
 
 @dataclass(frozen=True, slots=True)
 class Answers:
-    """All side conditions of a goal, settled."""
+    """All side conditions of a goal with their answers."""
 
     goal: Goal
     settled: Mapping[SideCondition, Settled]
@@ -71,7 +71,7 @@ Told = Callable[[str, Settled], None]
 
 @dataclass(frozen=True, slots=True)
 class Claim:
-    """A side condition's obligation: its digest, and whether it is asked for."""
+    """A side condition's obligation: its digest, and whether it is requested."""
 
     digest: str
     wanted: bool
@@ -84,8 +84,8 @@ def settle(
     told: Told | None = None,
     claims: Mapping[SideCondition, Claim] | None = None,
 ) -> Answers:
-    """Discharge every side condition of a derivation, and judge its loops. Of `claims` that are not asked for it is
-    enough to know that they were not proved before (`avow.calculus.entailment`)."""
+    """Check every side condition of a derivation, and judge its loops. For `claims` that are not requested, the earlier
+    result that they were not proved is enough (`avow.calculus.entailment`)."""
     bounds = bounds or Bounds()
     solver = _Solver(frame, frozenset(goal.nodes), bounds, frozenset(goal.root.assumed))
     settled: dict[SideCondition, Settled] = {}
@@ -103,7 +103,7 @@ def settle(
         if told is not None:
             told(goal.name, settled[condition])
     settled = _break_circles(solver, settled)
-    if frame.left_out:  # an example that keeps to all that was said need not keep to that
+    if frame.left_out:  # a counterexample need not satisfy the clauses left out
         settled = {
             c: s if s.circle or s.verdict is Verdict.PROVED else replace(s, verdict=Verdict.UNKNOWN)
             for c, s in settled.items()
@@ -113,10 +113,9 @@ def settle(
 
 
 def would_hold(frame: Frame, goal: Goal, settled: Settled) -> tuple[tuple[Phase, tuple[Offer, ...]], ...]:
-    """For each case of a side condition that is refuted: the clauses with any one of which it would be proved.
+    """For each refuted case of a side condition: clauses, any one of which would make it provable.
 
-    Nothing is offered where values run in a circle through the consumer within one step: what would be proved there
-    might be circular.
+    Empty if values flow in a cycle through the consumer within one step: a proof there might be circular.
     """
     condition = settled.condition
     solver = _Solver(frame, frozenset(goal.nodes), Bounds(), frozenset(goal.root.assumed))
@@ -150,14 +149,14 @@ class _Solver:
     selected: frozenset[str]
     bounds: Bounds
     kept: frozenset[ClauseName]
-    """Assumptions that the conclusion leaves assumed: a node's own may be used for its other ones."""
+    """Assumptions that the conclusion leaves assumed: a node's own ones may be used to prove its other ones."""
 
     def condition(self, condition: SideCondition, allowed: frozenset[str] | None = None) -> Settled:
-        """Settle one side condition; `allowed`: the nodes whose contracts may be used at the same step.
+        """Check one side condition; `allowed`: the nodes whose contracts may be used at the same step.
 
-        What is closest to the goal is tried first: it makes the proof that a reader expects, and the question small. A
-        provider of a thousand consumers guarantees a thousand things, of which each consumer needs a few; and all nodes
-        of a chain are ancestors of its last one. Only the widest question refutes.
+        Hypotheses closest to the goal are tried first: they give the proof that a reader expects, and a small query. A
+        provider of a thousand consumers has a thousand guarantees, of which each consumer needs a few; and all nodes of
+        a chain are ancestors of its last one. Only the widest query refutes.
         """
         allowed = self.selected if allowed is None else allowed
         nearest = self.nearest(condition, allowed)
@@ -183,8 +182,8 @@ class _Solver:
     def wider(
         self, condition: SideCondition, nearest: Premises, allowed: frozenset[str] | None = None
     ) -> list[Premises]:
-        """Ever more nodes, up to all from which values flow to the consumer. What holds one step earlier holds of every
-        selected node: each step's assumptions come before the next's."""
+        """Larger and larger sets of nodes, up to all from which values flow to the consumer. The contracts one step
+        earlier may be used for every selected node: each step's assumptions are proved before the next's."""
         graph, (_, first) = self.frame.graph, nearest
         ancestors = graph.ancestors(condition.consumer, self.selected if allowed is None else allowed)
         behind = (*ancestors, condition.consumer)
@@ -207,7 +206,7 @@ class _Solver:
         whether: bool = False,
         further: Mapping[str, Term] | None = None,
     ) -> Settled:
-        """`whether`: only a proof matters, so that the first case without one ends it."""
+        """`whether`: only a proof matters, so it stops at the first case without one."""
         cases: list[Case] = []
         effort = min(effort, self.bounds.effort)
         for phase in self.phases(condition, premises):
@@ -231,7 +230,7 @@ class _Solver:
         return _settled(condition, tuple(cases))
 
     def phases(self, condition: SideCondition, premises: Premises) -> tuple[Phase, ...]:
-        """One question, or one about the first step and one about every later."""
+        """One query, or one about the first step and one about every later step."""
         remembering = self.frame.remembering(self.selected)
         stepwise = premises[1] or condition.delayed or remembering
         return (Phase.INITIAL, Phase.LATER) if stepwise else (Phase.SAME_STEP,)
@@ -239,7 +238,7 @@ class _Solver:
     def question(
         self, condition: SideCondition, phase: Phase, premises: Premises, *, closest_only: bool = False
     ) -> tuple[Hypotheses, Term]:
-        """What may be used in a phase, and the assumption that has to follow."""
+        """The hypotheses of a phase, and the assumption that has to follow."""
         frame, (same, before) = self.frame, premises
         goal = frame.clause(condition.consumer, condition.clause)
         contracts = [frame.promised(node) for node in same]
@@ -256,12 +255,12 @@ class _Solver:
         return hypotheses | bearing({k: v for part in around for k, v in part.terms.items()}, spoken), goal
 
     def own(self, consumer: str) -> Hypotheses:
-        """What a consumer assumes that stays assumed."""
+        """The consumer's assumptions that stay assumed."""
         names = (ClauseName(consumer, clause.name) for clause in self.frame.node(consumer).assumptions)
         return {str(name): self.frame.clause(name.node, name.clause) for name in names if name in self.kept}
 
     def by_itself(self, condition: SideCondition, premises: Premises) -> Settled | None:
-        """Where a node feeds itself at the same step, and what it guarantees would show what it assumes: circular."""
+        """The circular answer, if a node feeds itself at the same step and its guarantees prove its assumption."""
         consumer = condition.consumer
         if not self.feeds(consumer, consumer, delayed=False):
             return None
@@ -274,8 +273,8 @@ class _Solver:
         return replace(answer, verdict=Verdict.REFUTED, circle=(consumer,))
 
     def deeper(self, condition: SideCondition, settled: Settled, premises: Premises) -> Settled:
-        """A later step at which the assumption may be false refutes nothing before that step is shown to be reached:
-        from the initial values, by as many steps as it takes; else it is only induction that fails."""
+        """A later step at which the assumption may be false refutes only if a run from the initial values reaches it;
+        otherwise only the induction fails."""
         first = next((case for case in settled.cases if case.phase is Phase.INITIAL), None)
         later = next((case for case in settled.cases if case.phase is Phase.LATER), None)
         if first is None or later is None or later.verdict is not Verdict.REFUTED:
@@ -331,10 +330,10 @@ def _settled(condition: SideCondition, cases: tuple[Case, ...]) -> Settled:
 
 
 def _break_circles(solver: _Solver, settled: dict[SideCondition, Settled]) -> dict[SideCondition, Settled]:
-    """Where proofs use, at one step, the contract of a node whose assumption they serve to prove: find others.
+    """Replace proofs that use, at one step, the contract of a node whose assumption they help to prove.
 
-    Nodes are established one after the other, each from those before it. What can be established in no order is
-    circular: its proofs do not count.
+    Nodes are established one after the other, each from those before it. Nodes that cannot be established in any order
+    are circular: their proofs do not count.
     """
     consumers = tuple(dict.fromkeys(condition.consumer for condition in settled))
     arcs = [(used, answer.condition.consumer) for answer in settled.values() for used in answer.used]

@@ -1,4 +1,4 @@
-"""What ``avow compose --json`` writes: docs/schemas/compose.schema.json follows from it."""
+"""The output of ``avow compose --json``; docs/schemas/compose.schema.json is generated from it."""
 
 from __future__ import annotations
 
@@ -103,7 +103,7 @@ class ComposeDocument:
 def told(
     composition: Composition, goals: Sequence[Goal], obligations: Sequence[Obligation], outcomes: Sequence[Outcome]
 ) -> ComposeDocument:
-    """All of it, for machines."""
+    """The document for a composition."""
     graph, plan = composition.frame.graph, composition.frame.system.plan
     written = [write_goal(goal, composition.known(goal)) for goal in goals]
     return ComposeDocument(

@@ -1,16 +1,15 @@
-"""Entailment between clauses of contracts: asked once, and helped where the solver gives up on quantifiers.
+"""Entailment between clauses of contracts: cached, and with help if the solver gives up on quantifiers.
 
 "There is a place around which all reports lie" follows from "there is exactly one place that is reported": the witness
-of the one serves for the other. Solvers with linear arithmetic do not find that by themselves, so it is put to them:
-an existential hypothesis holds of some values (its witnesses), and an existential goal is proved once it is proved of
-these. That claim is stronger: if it fails, the original question is asked.
+of the one also serves for the other. Solvers with linear arithmetic do not find this by themselves, so they get it as a
+query: an existential hypothesis holds for some values (its witnesses), and an existential goal is proved once it is
+proved for these. This claim is stronger: if it fails, the original query is made.
 
-Within `keeping`, answers of earlier runs serve again, so that after an edit only changed questions are put to the
-solver. An answer depends on the question alone: the hypotheses with their labels, the goal, effort and seed; or a
-script of the kernel. Proofs are kept, what the kernel was answered, and that hypotheses are too few. A side condition
-that does not hold is kept under its obligation's digest, and asked again only if it is requested. All of this only
-guides the search: the kernel decides whether a claim is proved, and asks everything itself in every run
-(`avow.pipeline.recheck`).
+Within `keeping`, answers of earlier runs are reused, so that after an edit only changed queries go to the solver. An
+answer depends on the query alone: the hypotheses with their labels, the goal, effort and seed; or a script of the
+kernel. The cache keeps proofs, the kernel's answers, and refutations. A side condition that does not hold is kept under
+its obligation's digest, and re-run only if it is requested. All of this only guides the search: the kernel decides
+whether a claim is proved, and makes all its queries itself in every run (`avow.pipeline.recheck`).
 """
 
 from __future__ import annotations
@@ -37,7 +36,7 @@ from avow.solving.translation import new_session
 
 @dataclass(frozen=True, slots=True)
 class NotProved:
-    """What is kept of a side condition that does not hold, or of a question."""
+    """The cached result of a side condition that does not hold, or of a query."""
 
     verdict: Verdict
     used: tuple[str, ...] = ()
@@ -49,24 +48,24 @@ _Kept = tuple[tuple[str, ...], bool] | Said | NotProved
 
 @dataclass(slots=True)
 class KeptAnswers:
-    """`before`: what earlier runs left; `now`: what was used or found in this one. What a proof needs and whether its
-    premises contradict, what a solver said of a script, or that something was not proved."""
+    """`before`: answers of earlier runs; `now`: those used or found in this one. An answer is what a proof needs and
+    whether its premises are contradictory, a solver's result for a script, or that something was not proved."""
 
     before: dict[str, _Kept] = field(default_factory=dict)
     now: dict[str, _Kept] = field(default_factory=dict)
     asked: int = 0
-    """Questions that were put to the solver."""
+    """The number of queries to the solver."""
 
     @classmethod
     def read(cls, text: str) -> KeptAnswers:
-        """What cannot be read is nothing."""
+        """Unreadable text gives an empty cache."""
         try:
             return cls(from_text(dict[str, _Kept], text))
         except Unreadable:
             return cls()
 
     def written(self) -> str:
-        """For the next run: those of this one, and as many of the earlier ones as there is room for."""
+        """The text for the next run: the answers of this one, and as many of the earlier ones as fit."""
         return json.dumps(to_json(dict(list({**self.before, **self.now}.items())[-ANSWERS_KEPT:])))
 
     def find(self, mark: str) -> _Kept | None:
@@ -81,7 +80,7 @@ _kept: ContextVar[KeptAnswers | None] = ContextVar("kept answers", default=None)
 
 @contextmanager
 def keeping(answers: KeptAnswers) -> Iterator[None]:
-    """What is asked within the block is looked up there first."""
+    """Queries within the block are looked up there first."""
     token = _kept.set(answers)
     try:
         yield
@@ -95,7 +94,7 @@ def kept_answers() -> KeptAnswers | None:
 
 
 def ask_once(script: str, budget: int) -> Said:
-    """As `avow.kernel.solvers.ask_z3`, where the question only is what the kernel will be answered."""
+    """The same as `avow.kernel.solvers.ask_z3`, cached: only to predict the answer that the kernel will get."""
     kept = _kept.get()
     if kept is None:
         return ask_z3(script, budget)
@@ -112,8 +111,8 @@ def ask_once(script: str, budget: int) -> Said:
 def implied(
     hypotheses: Mapping[str, Term], goal: Term, *, effort: int, seed: int = 0, whether: bool = False
 ) -> Entailment:
-    """As `avow.solving.questions.entails`: the quick question first, then with witnesses, then at length. A kept
-    refutation has no counterexample, and serves only where it matters `whether` the goal is proved."""
+    """The same as `avow.solving.questions.entails`: first a quick query, then with witnesses, then at full effort. A
+    cached refutation has no counterexample, and is used only if it matters only `whether` the goal is proved."""
     kept = _kept.get()
     if kept is None:
         return _implied(hypotheses, goal, effort, seed)
@@ -148,7 +147,7 @@ def _implied(hypotheses: Mapping[str, Term], goal: Term, effort: int, seed: int)
 
 
 def _opened(hypotheses: Mapping[str, Term]) -> tuple[dict[str, Term], list[tuple[Variable, ...]]]:
-    """The hypotheses with names for what their outermost existential quantifiers say there is, and these names."""
+    """The hypotheses with names for the witnesses of their outermost existential quantifiers, and these names."""
     opened: dict[str, Term] = {}
     witnesses: list[tuple[Variable, ...]] = []
     for label, hypothesis in hypotheses.items():

@@ -1,8 +1,10 @@
-"""The derived system-level contract: a contract like any other; a composed system can be a node of a larger one.
+"""The derived system-level contract: a contract like any other, so that a composed system can be a node of a larger
+one.
 
 Its inputs are what the selected nodes read from outside (and, for delayed edges, the values of the step before); its
-outputs are all that they put out; it assumes what the derivation assumes (and what it shows of the step before), and
-guarantees what its nodes guarantee. What it says is `Derived` in proofs/instances.dfy: what stays open is assumed.
+outputs are all outputs of these nodes. It assumes what the derivation assumes (and what the derivation shows about the
+step before), and guarantees what its nodes guarantee. It is an instance of `Derived` in proofs/instances.dfy:
+assumptions that stay open are assumed.
 """
 
 from __future__ import annotations
@@ -23,8 +25,8 @@ from avow.system.plan import Endpoint
 
 
 def derived_contract(composition: Composition, goal: Goal) -> Contract:
-    """The contract of the selected nodes taken together, as one node with the goal's name; of subsystems among them,
-    the nodes inside count. Raises Rejected for a clause that speaks of other steps."""
+    """The contract of the selected nodes together, as one node with the goal's name; subsystems among them are replaced
+    by the nodes inside. Raises Rejected if a clause mentions other steps."""
     frame = composition.frame
     nodes = composition.leaves(goal, goal.nodes)
     for owner in nodes:
@@ -50,11 +52,11 @@ def derived_contract(composition: Composition, goal: Goal) -> Contract:
                 fresh = names.give(variable, Role.INPUT, node, label)
                 inputs[fresh.name] = Port(Role.INPUT, fresh.name, port.sort, port.type_name)
     assumptions: list[Clause] = []
-    # What speaks of the step before was shown by induction over the system's own steps; a larger system that feeds the
-    # values back has to show it again.
+    # Assumptions about the step before were shown by induction over the system's own steps; a larger system that feeds
+    # the values back has to show them again.
     parts = goal.inner_first()
     delayed = [(part, condition.about) for part in parts for condition in part.conditions if condition.delayed]
-    # What was shown with the help of the step before is not shown of values that merely come in as such.
+    # Assumptions shown with facts about the step before are not shown for values that come in as plain inputs.
     apart_from_before = {
         (part, condition.about)
         for part in parts
@@ -89,7 +91,7 @@ def derived_contract(composition: Composition, goal: Goal) -> Contract:
 
 
 def _by_the_step_before(composition: Composition, part: Goal, condition: SideCondition) -> bool:
-    """Whether a proof of a side condition may have used it: not where one question about one step was enough."""
+    """Whether a proof of a side condition may have used the step before; not if one query about one step was enough."""
     answer = composition.known(part).get(condition)
     graph = composition.frame_of(part).graph
     delays = any(e.delayed and {e.source.node, e.target.node} <= set(part.nodes) for e in graph.edges)
@@ -97,8 +99,8 @@ def _by_the_step_before(composition: Composition, part: Goal, condition: SideCon
 
 
 def _whatever(term: Term, outputs: set[Variable]) -> Term:
-    """What a subsystem assumes of values from inside as well is to hold whatever these are. One cannot say so of
-    relations; then the assumption speaks of outputs, and is hard to show."""
+    """An assumption that also mentions values from inside has to hold for all of these. This cannot be expressed for
+    relations; then the assumption mentions outputs, and is hard to show."""
     spoken = tuple(v for v in sorted(free_variables(term), key=lambda v: v.name) if v in outputs)
     if not spoken or any(isinstance(v.sort, FunctionSort) for v in spoken):
         return term
@@ -107,7 +109,7 @@ def _whatever(term: Term, outputs: set[Variable]) -> Term:
 
 
 class _Names:
-    """System-level variables as ports of one node; a name that two nodes use is prefixed by its node."""
+    """System-level variables as ports of one node; a name that two nodes use is prefixed with its node's name."""
 
     def __init__(self) -> None:
         self.given: dict[Variable, Variable] = {}

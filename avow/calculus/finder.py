@@ -1,16 +1,15 @@
-"""Finds certificates for what the calculus has proved. Nothing here is trusted: `avow.kernel.check` decides.
+"""Finds certificates for claims that the calculus has proved. Nothing here is trusted: `avow.kernel.check` decides.
 
 A certificate of a scope (the nodes of a derivation, or all) shows each assumption of a node by an instance of the
 theorem in `proofs/instances.dfy`:
 
-- R1 to R4 and loops through delays: `Nodes` (assumptions in causal order, each from lower ranks now and from all that
-  held the step before; at the first step from the initial values). The rule's name is presentation only.
+- R1 to R4 and loops through delays: `Nodes` (assumptions in causal order, each from lower ranks now and from everything
+  that held the step before; at the first step from the initial values). The rule's name is presentation only.
 - k-induction: the theorem itself, with k base questions.
 - an assumption that stays assumed, and subsystems: `Derived` (an open entry). A subsystem is flattened: its nodes'
   clauses are the entries.
 
-The premises that the proof names are tried first, then all that is established, from which an unsatisfiable core is
-taken.
+The premises that the proof names are tried first, then an unsatisfiable core of everything that is established.
 """
 
 from __future__ import annotations
@@ -35,8 +34,8 @@ from avow.solving.z3_module import z3
 
 @dataclass(frozen=True, slots=True)
 class Hint:
-    """What the engine's proof of an assumption names: clauses (``agent.low``) with how many steps before. `first` is of
-    the first step, where it is a case of its own; `depth` of how many steps an induction is."""
+    """The premises named in the engine's proof of an assumption: clauses (``agent.low``) with the number of steps
+    before. `first` is for the first step, if it is a separate case; `depth` is the number of steps of an induction."""
 
     step: tuple[tuple[str, int], ...]
     first: tuple[tuple[str, int], ...] | None = None
@@ -53,7 +52,7 @@ class Item:
 
     @property
     def label(self) -> str:
-        """What the engine calls it."""
+        """The engine's label for it."""
         if self.claim.kind is Claimed.ENVIRONMENT:
             return f"environment {self.claim.name}"
         if self.claim.kind is Claimed.DEFINITION:
@@ -73,40 +72,40 @@ class _Proof:
     base: tuple[_Base, ...]
     step: _Uses
     witnesses: tuple[_Witness, ...] = ()
-    """For each first step, and for every later one."""
+    """One for each first step, and one for every later step."""
 
 
 @dataclass(slots=True)
 class Finder:
-    """One scope. `open`: assumptions that stay assumed; without any of these, what speaks only of the environment is
-    the environment's."""
+    """The search for one scope's certificate. `open`: assumptions that stay assumed; an assumption only about the
+    environment becomes an environment assumption."""
 
     known: Statements
     scope: str
     nodes: Sequence[str]
-    """Providers before consumers, as far as there is such an order."""
+    """Providers before consumers, as far as possible."""
     delayed: bool
     open: frozenset[str]
     hints: Mapping[str, Hint]
     hopeless: frozenset[str] = frozenset()
-    """What the engine could not prove."""
+    """Labels of the assumptions that the engine could not prove."""
     goals: tuple[Statement, ...] = ()
     """Requirements, to be shown after everything else."""
     lemmas: tuple[tuple[str, ...], ...] = ()
-    """Invariants that were found, with claims of their own: to be shown before the goals."""
+    """Invariants that were found, as separate claims: to be shown before the goals."""
     solvers: Solvers = field(default_factory=Solvers)
     _proofs: dict[Item, _Proof] = field(default_factory=dict)
     _now: dict[str, Item] = field(default_factory=dict)
-    """What is established, by label."""
+    """The established items, by label."""
     _then: dict[str, Item] = field(default_factory=dict)
-    """What may be used of the steps before, by label."""
+    """The items that may be used at earlier steps, by label."""
     _ever: list[Item] = field(default_factory=list)
     _initials: tuple[Statement, ...] | None = None
     _failed: set[tuple[Item, int, int]] = field(default_factory=set)
-    """What could not be shown, when so much was established and usable."""
+    """Items that could not be shown, with the numbers of items then established and usable."""
 
     def find(self) -> Certificate:
-        """The entries that could be shown, and what they rest on."""
+        """The certificate with the entries that could be shown, and what they depend on."""
         ever = self.items()
         while True:
             established = self.established(ever)
@@ -117,7 +116,7 @@ class Finder:
             ever = [item for item in ever if item in established]
 
     def items(self) -> list[Item]:
-        """All that may ever be an entry."""
+        """All possible entries."""
         found: list[Item] = []
         own = set(self.nodes)
         found += [Item(How.ENVIRONMENT, s) for s in self.known.every if s.kind is Claimed.ENVIRONMENT]
@@ -143,11 +142,12 @@ class Finder:
         return [s for s in self.known.every if s.kind is Claimed.REQUIREMENT and s.name in wanted]
 
     def remembered(self, definition: Statement) -> bool:
-        """Whether it is what is remembered for one of the goals."""
+        """Whether it defines a cell of one of the goals."""
         return not definition.node and any(definition.name.startswith(f"{OBSERVED}{g.name}.") for g in self.goals)
 
     def established(self, ever: list[Item]) -> dict[Item, None]:
-        """What can be shown, each from what comes before it at the same step and from anything of `ever` before."""
+        """The items that can be shown, each from earlier items at the same step and from any of `ever` at earlier
+        steps."""
         self._ever, self._then, self._now = ever, {item.label: item for item in ever}, {}
         done: dict[Item, None] = {}
 
@@ -183,7 +183,7 @@ class Finder:
     # -- one claim -----------------------------------------------------------------------------------------------------
 
     def shown(self, item: Item, done: Mapping[Item, None]) -> bool:
-        """Find a proof from what is established at the same step, and from what ever is at the steps before."""
+        """Find a proof from the items established at the same step, and from all items at earlier steps."""
         if item.label in self.hopeless:
             return False
         known = self._proofs.get(item)
@@ -214,7 +214,7 @@ class Finder:
                 yield self.inductive(item, list(done), depth)
 
     def hinted(self, item: Item, hint: Hint, done: Mapping[Item, None]) -> _Proof | None:
-        """The premises that the engine's proof names."""
+        """A proof from the premises that the engine's proof names."""
 
         def uses(labels: Iterable[tuple[str, int]]) -> _Uses | None:
             found = [
@@ -239,7 +239,7 @@ class Finder:
         core = self.core(item, premises)
         if core is not None:
             return self.kept(item, (), core[0])
-        goal = item.claim.term  # a witness settles what the search for instances does not find
+        goal = item.claim.term  # a witness may help if the search for instances fails
         exists = isinstance(goal, Quantified) and goal.quantifier is Quantifier.EXISTS
         return self.kept(item, (), premises) if exists else None
 
@@ -257,14 +257,14 @@ class Finder:
         return self.kept(item, tuple(bases), step[0]) if step is not None else None
 
     def kept(self, item: Item, base: tuple[_Base, ...], step: _Uses) -> _Proof | None:
-        """The proof, if the kernel finds its questions valid; with a witness where one is needed."""
+        """The proof, if the kernel finds its questions valid; with a witness if one is needed."""
         begun = complete(map(self.begun, base))
         if begun is None:
             return None
         base = tuple(begun)
         items = list(dict.fromkeys([*(i for uses in (*(b for b, _ in base), step) for i, _ in uses), item]))
         ranks = {i: k for k, i in enumerate(items)}
-        # ranks and conditions are another matter: here only the questions are asked
+        # only the questions are checked here, not ranks and conditions
         stand_ins = tuple(Entry(i.how, i.claim.node, i.claim.digest) for i in items)
         kernel = Kernel(self.known, Certificate(self.scope, stand_ins), self.solvers)
         found: list[_Witness] = []
@@ -282,8 +282,8 @@ class Finder:
         return _Proof(base, step, tuple(found))
 
     def begun(self, base: _Base) -> _Base | None:
-        """A first step whose initial conditions the kernel takes: where it must, with what is assumed of all that is
-        constant in the environment. None where it does not even so."""
+        """A first step whose initial conditions the kernel accepts, if necessary with the assumptions about constants
+        of the environment; None if it does not accept them even so."""
         uses, initials = base
         constant = (
             (i, 0) for i in self._ever if i.how is How.ENVIRONMENT and all(p.rigid for p in i.claim.places.values())
@@ -300,7 +300,7 @@ class Finder:
         return None
 
     def witnesses(self, item: Item, uses: _Uses, initials: tuple[str, ...]) -> list[tuple[int, int]]:
-        """Where a claim says that something exists: the premises that say so of something of the same type."""
+        """For an existential claim: the existential premises over the same types."""
         goal = item.claim.term
         if not (isinstance(goal, Quantified) and goal.quantifier is Quantifier.EXISTS):
             return []
@@ -348,7 +348,7 @@ class Finder:
         return self._initials
 
     def core(self, item: Item, premises: _Uses, *, initially: int | None = None) -> _Base | None:
-        """Of the premises those that a proof needs; None where none is found. `initially`: about that first step."""
+        """The premises that a proof needs; None if none is found. `initially`: the first step that it is about."""
         text = Text()
         initials = self.initials() if initially is not None else ()
         try:

@@ -1,4 +1,4 @@
-"""Where one step of induction fails: more steps, from the initial values and backwards, or an invariant.
+"""If one step of induction fails: more steps, from the initial values and backwards, or an invariant.
 
 If a step from *some* state breaks a claim, the claim is not yet refuted: the state may be unreachable. So the steps are
 unrolled from the initial values, and a run to a state in which the claim is false refutes it. Or every step after
@@ -39,27 +39,27 @@ from avow.solving.limits import effort_left, until
 from avow.solving.questions import Entailment
 
 BEFORE = "@before"
-"""Ends the name of a value of the step before."""
+"""Suffix of the name of a value of the step before."""
 
 
 @dataclass(frozen=True, slots=True)
 class Deeper:
-    """What more steps gave. `proved`: with the hypotheses needed; `run`: one that reaches a step at which the claim is
-    false; neither: unknown."""
+    """The result of trying more steps. `proved`: the hypotheses that the proof needs; `run`: a run to a step at which
+    the claim is false; neither: unknown."""
 
     proved: tuple[str, ...] | None = None
     run: Counterexample | None = None
     steps: int = 0
-    """Of the proof, how many steps before; of the run, its length."""
+    """For a proof, the number of earlier steps; for a run, its length."""
     engine: str = ""
     by: tuple[str, ...] = ()
-    """An invariant that was found, by which it is proved."""
+    """An invariant that was found and proves the claim."""
 
 
 @dataclass(frozen=True, slots=True)
 class Steps:
-    """The contracts at several steps. `ever`: all that holds at a finished step, by label; `last`: what may be used at
-    the step that the claim is about; `initial`: what holds before the first step."""
+    """The contracts at several steps. `ever`: everything that holds at a finished step, by label; `last`: the
+    hypotheses at the step that the claim is about; `initial`: what holds before the first step."""
 
     ever: Mapping[str, Term]
     last: Mapping[str, Term]
@@ -68,33 +68,33 @@ class Steps:
     constant: frozenset[Variable]
 
     def shifted(self, term: Term, by: int) -> Term:
-        """A formula, as it was so many steps earlier."""
+        """A formula about the values so many steps earlier."""
         if by == 0:
             return term
         changing = free_variables(term) - self.constant
         return substitute(term, {v: Variable(v.role, v.name + BEFORE * by, v.sort) for v in changing})
 
     def run(self, length: int) -> dict[str, Term]:
-        """What is known of a run of so many steps from the initial values on."""
+        """The facts about a run of so many steps from the initial values."""
         found = {label: self.shifted(term, length - 1) for label, term in self.initial.items()}
         return found | self.known(length - 1)
 
     def known(self, before: int) -> dict[str, Term]:
-        """What is known of the last step, and of so many before it."""
+        """The facts about the last step, and about so many steps before it."""
         found = dict(self.last)
         for by in range(1, before + 1):
             found |= {_labelled(label, by): self.shifted(term, by) for label, term in self.ever.items()}
         return found
 
     def kept(self, before: int) -> dict[str, Term]:
-        """That the claim held at each of so many steps before."""
+        """The claim at each of so many earlier steps."""
         return {_labelled("the claim", by): self.shifted(self.claim, by) for by in range(1, before + 1)}
 
 
 def steps(
     frame: Frame, ever: Mapping[str, Term], last: Mapping[str, Term], initial: Mapping[str, Term], claim: Term
 ) -> Steps:
-    """`ever` and `last` are in the variables of the step itself (and of the one before), as the frame's clauses are."""
+    """`ever` and `last` are over the variables of the step itself (and of the one before), like the frame's clauses."""
     constant = set()
     for endpoint in frame.graph.environment:
         variable = frame.input(endpoint.node, endpoint.port)
@@ -104,10 +104,10 @@ def steps(
 
 
 def _deeper(asked: Steps, effort: int, seed: int, claim_name: str, lengths: range) -> Deeper:
-    """Unroll to these lengths, and induct over more steps, in turn, with so much effort. The claim must have been
-    proved at the first step."""
+    """Alternately unroll to these lengths and try induction over more steps, within this effort. The claim must have
+    been proved at the first step."""
     end = until(effort)
-    sure = 1  # so many steps from the beginning the claim is proved
+    sure = 1  # the number of steps from the beginning at which the claim is proved
 
     def ask(hypotheses: Mapping[str, Term]) -> Entailment | None:
         left = effort_left(end)
@@ -132,7 +132,7 @@ def _labelled(label: str, by: int) -> str:
 
 
 def _plain(labels: Sequence[str]) -> tuple[str, ...]:
-    """However many steps before, as one step before: what a proof rests on is the same clause."""
+    """The labels with any number of steps before written as one step before: the proof uses the same clause."""
     found: dict[str, None] = {}
     for label in labels:
         for by in range(2, DEEPEST_INDUCTION + 1):
@@ -150,7 +150,7 @@ def _run(values: Mapping[Variable, Value], length: int, claim: str) -> Counterex
         shown: dict[str, str] = {}
         for variable, value in sorted(values.items(), key=lambda item: item[0].qualified):
             if CELL in variable.name:
-                continue  # what is remembered follows from the steps before, which are shown
+                continue  # cells follow from the earlier steps, which are shown
             base, times = variable.name, 0
             while base.endswith(BEFORE):
                 base, times = base.removesuffix(BEFORE), times + 1
@@ -171,16 +171,16 @@ Written = tuple[str, ...]
 
 _BEFORE = " one step before"
 INVARIANT = "invariant "
-"""Begins what an invariant is called among hypotheses and claims; no clause is called so."""
+"""Prefix of the name of an invariant among hypotheses and claims; no clause name begins with it."""
 
 
 def label(written: Written) -> str:
-    """What an invariant is called."""
+    """The name of an invariant."""
     return INVARIANT + _named(written, [name.partition(".")[2] for name in written[1:]])
 
 
 def in_words(frame: Frame, written: Written) -> str:
-    """An invariant for people: a state variable is written as the record that it is kept for."""
+    """An invariant in readable form: a state variable is written as the operator that it is kept for."""
     cells = {called: (node, cell) for of in ("", *frame.observed) for node, called, cell in frame.own_cells(of)}
     names = [name.partition(".")[2] for name in written[1:]]
     return _named(written, [_remembered(frame, *cells[name]) if name in cells else name for name in names])
@@ -193,7 +193,7 @@ def _named(written: Written, names: Sequence[str]) -> str:
 
 
 def _remembered(frame: Frame, node: str, cell: Cell) -> str:
-    """What a step leaves in a cell."""
+    """The value of a cell after a step, in readable form."""
     record = cell.record
     if record is None:
         return cell.name.replace(CELL, "")
@@ -205,14 +205,14 @@ def _remembered(frame: Frame, node: str, cell: Cell) -> str:
 
 
 _OF_NOW = (Past.PREVIOUS, Past.ROSE, Past.FELL, Past.CHANGED)
-"""Records for which the argument's value is kept."""
+"""Operators for which the argument's value is kept."""
 
 _CALLED = (Past.ONCE, Past.HISTORICALLY)
 
 
 def further(frame: Frame, asked: Steps, effort: int, seed: int, claim_name: str) -> Deeper:
-    """What settles a claim that holds at the first step and that one step of induction does not keep: induction over a
-    few steps, an invariant, or a run that breaks it; longer ones where Spacer says that there is one."""
+    """Decides a claim that holds at the first step but is not inductive over one step: by induction over a few steps,
+    by an invariant, or by a run that violates it (a longer one if Spacer reports that there is one)."""
     each = min(effort, DEEPER_EFFORT)
     found = _deeper(asked, each, seed, claim_name, range(2, DEEPEST_INDUCTION + 1))
     if found.proved is not None or found.run is not None:
@@ -225,7 +225,7 @@ def further(frame: Frame, asked: Steps, effort: int, seed: int, claim_name: str)
 
 
 def _guessed(asked: Steps, effort: int) -> Found:
-    """Deterministic: Spacer's steps bound it."""
+    """Deterministic: bounded by Spacer's steps, not by time."""
     state: dict[Variable, Variable] = {v: v for v in asked.constant}
     terms = (asked.claim, *asked.ever.values(), *asked.last.values(), *asked.initial.values())
     for v in frozenset[Variable]().union(*map(free_variables, terms)):
@@ -237,7 +237,8 @@ def _guessed(asked: Steps, effort: int) -> Found:
 
 
 def _inductive(frame: Frame, asked: Steps, found: Term, effort: int, seed: int) -> Deeper | None:
-    """A proof of the claim by an invariant, where it is one: it holds at the first step, is kept, and implies it."""
+    """A proof of the claim by a suggested invariant, if it holds at the first step, is preserved, and implies the
+    claim."""
     written = write(frame, found)
     if written is None:
         return None
@@ -247,14 +248,14 @@ def _inductive(frame: Frame, asked: Steps, found: Term, effort: int, seed: int) 
     later = implied({**asked.last, **held}, asked.claim, effort=effort, seed=seed)
     if {first.verdict, kept.verdict, later.verdict} != {Verdict.PROVED}:
         return None
-    # what keeps it did so a step before
+    # hypotheses of preservation are about the step before
     before = (n if n.endswith(_BEFORE) else n + _BEFORE for n in (*first.needed, *kept.needed))
     needed = (n for n in (*later.needed, *before) if not n.startswith("initial "))
     return Deeper(tuple(dict.fromkeys(needed)), steps=1, engine=later.engine, by=written)
 
 
 def write(frame: Frame, term: Term) -> Written | None:
-    """A formula over a system's variables as text; None where one of these is no value of a port or a memory."""
+    """A formula over a system's variables as text; None if some variable is not the value of a port or a cell."""
     named = _inputs(frame)
     names: list[str] = []
     short: dict[Variable, Variable] = {}
@@ -267,7 +268,7 @@ def write(frame: Frame, term: Term) -> Written | None:
 
 
 def read(written: Written, contract: Contract, wiring: Wiring) -> Term | None:
-    """The formula of a text over ``node.port``, as the kernel's claims are; None where it is none any more."""
+    """The formula of a text over ``node.port``, like the kernel's claims; None if it no longer fits the contract."""
     formula, *names = written
     meant: dict[str, Variable] = {}
     for k, name in enumerate(names):
@@ -285,7 +286,7 @@ def read(written: Written, contract: Contract, wiring: Wiring) -> Term | None:
 
 
 def with_lemmas(system: Wiring, contract: Contract, lemmas: Iterable[Written]) -> Wiring:
-    """A system with the claims of some lemmas: of those that say something of it as it is now."""
+    """A system with the claims of those lemmas that still fit it."""
     found = ((label(each), read(each, contract, system)) for each in lemmas)
     more = tuple((Claimed.REQUIREMENT, "", name, term) for name, term in found if term is not None)
     return replace(system, formulas=(*system.formulas, *more))

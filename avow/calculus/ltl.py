@@ -1,4 +1,4 @@
-"""Temporal properties over an explicit graph of steps: is there a run that breaks the property, and which?"""
+"""Temporal properties over an explicit graph of steps: is there a run that violates the property, and which?"""
 
 from __future__ import annotations
 
@@ -46,12 +46,12 @@ def normal(formula: Property, positive: bool = True) -> ltl.Normal[State]:
 
 
 def demands_progress(formula: Property) -> bool:
-    """Whether the property wants something to happen at some time: then a system that stops breaks it."""
+    """Whether the property demands that something happens eventually: then a system that stops violates it."""
     return any(isinstance(part, ltl.Until) for part in ltl.parts(normal(formula)))
 
 
 class TooLong(Exception):  # noqa: N818 - it names what happened
-    """No answer with the effort for it, or the property is too large to be asked about."""
+    """No answer within the effort limit, or the property is too large to check."""
 
 
 Judge = Callable[[int, State], bool]
@@ -64,7 +64,7 @@ def violation(
     holds: Judge,
     deadline: float | None = None,
 ) -> Lasso | None:
-    """A run of the graph that breaks the property, or None. Every step must have a successor for a run to count.
+    """A run of the graph that violates the property, or None. Every step must have a successor for a run to count.
 
     `deadline` is in units of `avow.solving.limits.spent`; raises TooLong after it.
     """
@@ -79,7 +79,7 @@ def refuted_prefix(
     holds: Judge,
     deadline: float | None = None,
 ) -> tuple[int, ...] | None:
-    """The steps of a shortest beginning of a run that breaks the property however the run goes on, or None.
+    """The steps of a shortest prefix of a run all of whose continuations violate the property, or None.
 
     `deadline` is in units of `avow.solving.limits.spent`; raises TooLong after it.
     """
@@ -90,7 +90,8 @@ def refuted_prefix(
 def _search(
     wanted: ltl.Normal[State], holds: Judge, deadline: float | None
 ) -> tuple[ltl.Automaton[State], Callable[[int], int], Callable[[], None]]:
-    """The automaton of a property, what it reads of each step, and what counts a search through it."""
+    """The automaton of a property, the state formulas that it reads at each step, and the counter of a search through
+    it."""
     try:
         automaton = ltl.build(wanted)
     except TooLarge:
@@ -109,7 +110,7 @@ def _search(
 
 
 def refuted_at(formula: Property, run: Sequence[Mapping[State, bool]]) -> int | None:
-    """The step of a beginning of a run up to which it breaks the property however it goes on; None if it need not.
+    """The first step of a prefix of a run after which every continuation violates the property; None if there is none.
 
     Raises TooLong.
     """

@@ -1,9 +1,9 @@
-"""Temporal requirements, settled on the composed contracts over the plan's scenario, before anything is implemented.
+"""Temporal requirements, checked on the composed contracts over the plan's scenario, before anything is implemented.
 
-`checked` only if every step that the scenario allows was looked at, and its domains leave out no output that the
-contracts allow; a search cut short is `tested` at best. A run that breaks the property is shown as it goes, with the
-step to which it returns, or up to the step after which no continuation can have the property. A system that cannot take
-another step stays as it is for ever, and the report says which node has no answer.
+The verdict is `checked` only if every step that the scenario allows was explored, and its domains leave out no output
+that the contracts allow; a search cut short is `tested` at best. A run that violates the property is shown step by
+step, with the step to which it returns, or up to the step after which no continuation has the property. A system that
+cannot take another step stays as it is for ever, and the report says which node has no output.
 """
 
 from __future__ import annotations
@@ -37,12 +37,12 @@ _Memory = tuple[object, ...]
 
 @dataclass(slots=True)
 class Explored:
-    """The steps reached so far. Steps that agree in what the property sees and in the memory they leave are one."""
+    """The steps reached so far. Steps that agree in the state formulas and in the memory after them are one."""
 
     machine: Machine
     judges: dict[State, Holds]
     deepest: int | None
-    """Steps after which a run is no longer followed; None: no such limit."""
+    """The number of steps after which a run is no longer followed; None: no limit."""
     steps: list[Step] = field(default_factory=list)
     index: dict[object, int] = field(default_factory=dict)
     following: dict[_Memory, tuple[int, ...]] = field(default_factory=dict)
@@ -68,25 +68,25 @@ class Explored:
         return self.following[memory]
 
     def kind(self, step: Step) -> int:
-        """The number of the steps that count as one with this one."""
+        """The index of the explored step that this one is identified with."""
         truth = tuple(judge(step.values) for judge in self.judges.values())
         return self.index[(truth, step.memory)]
 
     def concrete(self, run: list[int]) -> list[Step]:
-        """A run of these kinds of steps, each step really taken from the memory that the one before it leaves."""
+        """A run of these kinds of steps in which each step starts from the memory after the one before it."""
         found: list[Step] = []
         memories = self.machine.initial()
         judges = tuple(self.judges.values())
         for kind in run:
             step = next((s for m in memories for s in self.machine.judged(m, judges) if self.kind(s) == kind), None)
-            if step is None:  # it stays as it is: there is no further step
+            if step is None:  # the system stays as it is: there is no further step
                 break
             found.append(step)
             memories = (step.memory,)
         return found
 
     def successors(self, step: int) -> tuple[int, ...]:
-        """The explored steps after a step; a step after which there is none stays for ever."""
+        """The explored successors of a step; a step without one is its own successor."""
         memory = self.steps[step].memory
         if memory not in self.following:
             return ()
@@ -103,8 +103,8 @@ def judge_property(machine: Machine, name: str, formula: Property, bounds: Bound
 
 
 def explored(machine: Machine, name: str, formula: Property, bounds: Bounds, deepest: int | None) -> Answer:
-    """As `judge_property`, from the steps that are reached, nearest first; no run is followed for more than `deepest`
-    steps."""
+    """The same as `judge_property`, by exploring the reachable steps breadth first; no run is followed for more than
+    `deepest` steps."""
     found = _begin(machine, formula, deepest)
     stopped = found.cannot_start is not None and demands_progress(formula)
     done = stopped or _explore(found, formula, bounds)
@@ -150,11 +150,11 @@ def _on_the_way(steps: Sequence[Step]) -> str:
 
 
 def _tried(machine: Machine, name: str, formula: Property, bounds: Bounds) -> Answer | None:
-    """Some runs at random: most systems that break a property do so soon, and a search need not even begin."""
+    """Tries some random runs: most systems that violate a property do so soon, which saves the search."""
     random = Random(bounds.seed)
     deadline = until(bounds.effort / 4)
     judges = _judges(machine, formula)
-    best: tuple[Walk, int | None] | None = None  # a run that gets stuck tells more than one that goes round
+    best: tuple[Walk, int | None] | None = None  # a run that gets stuck is preferred to one that repeats
     for _ in range(RUNS_TRIED):
         walk = machine.walk(random, RUN_LENGTH, until_repeat=True, judges=tuple(judges.values()))
         if walk.steps and (walk.back is not None or (walk.stuck is not None and walk.stuck.genuine)):
@@ -173,14 +173,14 @@ def _tried(machine: Machine, name: str, formula: Property, bounds: Bounds) -> An
 
 
 def _breaks(steps: Sequence[Step], back: int, formula: Property, judges: dict[State, Holds]) -> bool:
-    """Whether a run, which goes on with step `back` after its last, breaks the property."""
+    """Whether a run that continues with step `back` after its last violates the property."""
     truth = [{state: judge(step.values) for state, judge in judges.items()} for step in steps]
     following = [(k + 1,) for k in range(len(steps) - 1)] + [(back,)]
     return violation(formula, [0], following.__getitem__, lambda k, state: truth[k][state]) is not None
 
 
 def _refuted_at(steps: Sequence[Step], formula: Property, judges: dict[State, Holds]) -> int | None:
-    """The first step up to which a run breaks the property however it goes on."""
+    """The first step after which every continuation of a run violates the property."""
     try:
         return refuted_at(formula, [{state: judge(step.values) for state, judge in judges.items()} for step in steps])
     except TooLong:
@@ -208,7 +208,7 @@ def _begin(machine: Machine, formula: Property, deepest: int | None) -> Explored
 
 
 def _explore(explored: Explored, formula: Property, bounds: Bounds) -> Lasso | tuple[int, ...] | bool:
-    """Breadth first; looks for a violation now and then. True: nothing is left to look at."""
+    """Explores breadth first and checks for a violation from time to time. True: nothing is left to explore."""
     deadline = until(bounds.effort)
     deepest = explored.deepest
     next_look, stuck_seen, cut = 64, 0, False
@@ -253,13 +253,13 @@ def _ended_by(explored: Explored, bounds: Bounds) -> str:
 
 
 def _violation(explored: Explored, formula: Property, deadline: float) -> Lasso | None:
-    """What was explored so far is held against the property. Raises TooLong."""
+    """A violation of the property among the steps explored so far. Raises TooLong."""
     truth = explored.truth
     return violation(formula, explored.initial, explored.successors, lambda k, state: truth[k][state], deadline)
 
 
 def _prefix(explored: Explored, formula: Property, bounds: Bounds) -> tuple[int, ...] | None:
-    """A beginning of a run that breaks the property however it goes on: such a run need not close."""
+    """A prefix of a run all of whose continuations violate the property: such a run need not repeat."""
     truth, deadline = explored.truth, until(bounds.effort / 4)
     try:
         return refuted_prefix(
@@ -293,7 +293,7 @@ def _shown_run(
     stuck: Stuck | None,
     bound: dict[str, object],
 ) -> Answer:
-    """A run that breaks the property, as a counterexample."""
+    """A run that violates the property, as a counterexample."""
     trace = tuple(step.shown(_interesting(machine, formula)) for step in steps)
     false = _false_at(machine, formula, steps)
     bad = _refuted_at(steps, formula, _judges(machine, formula)) if false is None and back is None else None
@@ -324,7 +324,7 @@ def _shown_run(
 def _doubt(
     machine: Machine, formula: Property, steps: Sequence[Step], back: int | None, *, stays: bool, cut: bool
 ) -> str:
-    """Why the run may be none, or none that breaks the property, once it is replayed; nothing where both are sure."""
+    """Why the replayed run may not be a run, or may not violate the property; empty if both are certain."""
     doubts = [_doubt_of(machine, formula, run, back, stays, cut) for run in completions(machine, steps)]
     return "" if "" in doubts else doubts[0]
 
@@ -338,13 +338,13 @@ def _doubt_of(
     known = complete(truths(machine, formula, step) for step in steps)
     if known is None:
         return "but over the scenario's values only is it sure that the property is broken"
-    # up to its last step it is broken however the run goes on, or the run goes round
+    # violated after its last step for every continuation, or the run repeats
     broken = refuted_at(formula, known) is not None if cut else back is not None and not holds(formula, known, back)
     return "" if broken else "but replayed it does not break the property"
 
 
 def _false_at(machine: Machine, formula: Property, steps: Sequence[Step]) -> int | None:
-    """Of ``always F``: the step at which F is false. What comes after it does not matter."""
+    """For ``always F``: the step at which F is false. Later steps do not matter."""
     match formula:
         case Temporal(operator=Operator.ALWAYS, parts=(State() as state,)):
             holds = _judges(machine, state)[state]
@@ -353,7 +353,7 @@ def _false_at(machine: Machine, formula: Property, steps: Sequence[Step]) -> int
 
 
 def _interesting(machine: Machine, formula: Property) -> list[str]:
-    """The variables worth showing: what the environment chose, the outputs, and what the property speaks of."""
+    """The variables to show: the environment's choices, the outputs, and those that the property mentions."""
     about = [
         variable.qualified
         for state in states_of(formula)
@@ -366,7 +366,7 @@ def _interesting(machine: Machine, formula: Property) -> list[str]:
 
 
 def cannot_run(frame: Frame, name: str, formula: Property, reason: CannotRun) -> Answer:
-    """The answer where the contracts cannot be run: a system that never takes a step does nothing that is demanded."""
+    """The answer if the contracts cannot be run: a system that never takes a step meets no progress property."""
     text = str(reason)
     if frame.graph.deadlocks and demands_progress(formula) and text.startswith("start-up deadlock"):
         summary = f"no run ever takes a step, so {name} is not met: {text}"

@@ -1,9 +1,10 @@
-"""What a node may put out, found by asking: a function's or a sequence's values are chosen where something looks.
+"""The outputs that a node may have, found by lazy search: a function's or a sequence's values are chosen when they are
+read.
 
-An open function has a table of what is decided, and `ANY` everywhere else. A guarantee that is evaluated over one stops
-where it has to know more, and says what (`Undecided`); where another part decides it, it does not stop. The search goes
-on with each value that there may be, and what no clause looks at stays open. So one open function stands for all
-functions that complete it, and a search that ends has looked at them all (lazy narrowing: Lindblad 2007; Runciman,
+An open function has a table of decided points, and `ANY` everywhere else. The evaluation of a guarantee over one stops
+at a point that it needs, and reports that point (`Undecided`), unless another part of the guarantee decides it. The
+search continues with each possible value, and points that no clause reads stay open. So one open function represents
+all functions that complete it, and a search that ends has covered them all (lazy narrowing: Lindblad 2007; Runciman,
 Naylor and Lindblad 2008).
 """
 
@@ -39,11 +40,11 @@ class _Any(Opaque):
 
 
 ANY = _Any("any", -1)
-"""Stands where nothing is decided yet: a function's default, or an element of a sequence."""
+"""Marks an undecided value: a function's default, or an element of a sequence."""
 
 
 class Undecided(Exception):  # noqa: N818 - it names a state
-    """A clause cannot be judged before these points are decided: (variable, arguments), in the order met."""
+    """A clause cannot be judged before these points are decided: (variable, arguments), in the order read."""
 
     def __init__(self, wanted: Sequence[tuple[str, Point]]) -> None:
         super().__init__(wanted)
@@ -60,12 +61,12 @@ def is_open(value: Value) -> bool:
             return default is ANY
         case SequenceValue(items=items):
             return any(item is ANY for item in items)
-        case _:  # other values are known as a whole
+        case _:  # other values are never open
             return False
 
 
 Lazy = tuple[tuple[str, tuple[Point, ...] | None], ...]
-"""Variables whose values may be open; of a function, all points that there are, if they are finitely many."""
+"""Variables whose values may be open; for a function, all its points, if they are finitely many."""
 
 
 def lazy_names(formula: Term, domains: Domains | None = None) -> Lazy:
@@ -93,7 +94,7 @@ def decided(value: Value, point: Point, result: Value) -> Value:
 
 
 def closed(value: Value, result: Value) -> Value:
-    """The open value with all its open places decided alike."""
+    """The open value with one value for all its open points."""
     match value:
         case FunctionValue(table=table):
             return FunctionValue(table, result)
@@ -107,7 +108,7 @@ def _order(entry: tuple[Point, Value]) -> tuple[object, ...]:
 
 
 def opened(found: Mapping[str, Value], names: Lazy) -> tuple[Mapping[str, Value], list[tuple[str, Point]]]:
-    """The valuation with its open values ready to be asked, and where the questions to them will be noted."""
+    """The valuation with its open values wrapped to record reads of open points, and the list of these reads."""
     wanted: list[tuple[str, Point]] = []
     asking: Values = {}
     for name, points in names:
@@ -124,12 +125,12 @@ def opened(found: Mapping[str, Value], names: Lazy) -> tuple[Mapping[str, Value]
 
 
 class _Asked(NotEvaluable):
-    """Evaluation met an open point. Where another part decides the whole, it does no harm."""
+    """Evaluation read an open point. This does no harm if another part decides the whole."""
 
 
 class _OpenTable(Mapping[Point, Value]):
-    """A table that says which point it was asked for. Asked for all, it asks for one after the other, if there is an
-    end to them."""
+    """A table that records which point was read. If all points are read, it reads one after the other, provided they
+    are finitely many."""
 
     def __init__(
         self,
@@ -219,7 +220,7 @@ class _OpenItems(Sequence[Value]):
 
 
 def asking(value: Value) -> bool:
-    """Whether a value that was computed holds on to an open sequence."""
+    """Whether a computed value contains an open sequence."""
     match value:
         case SequenceValue(items=items):
             return isinstance(items, _OpenItems) or any(map(asking, items))
@@ -234,7 +235,7 @@ def asking(value: Value) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class Forcing:
-    """``when -> out.name == value`` or, with arguments, ``when -> out.name(arguments) == value``: no other will do."""
+    """An equation ``when -> out.name == value`` or, with arguments, ``when -> out.name(arguments) == value``."""
 
     name: str
     arguments: tuple[Evaluator, ...] | None
@@ -245,8 +246,8 @@ class Forcing:
     def forced(
         self, found: Mapping[str, Value], point: Point | None, wanted: list[tuple[str, Point]]
     ) -> tuple[Value, ...] | None:
-        """The only value that is possible, if this equation says so of this port (at this point). `wanted` gets what it
-        would have to know first."""
+        """The only possible value of this port (at this point), if this equation gives one. Open points that it needs
+        are added to `wanted`."""
         if (point is None) is not (self.arguments is None):
             return None
         values, asked = opened(found, self.lazy)
@@ -259,7 +260,7 @@ class Forcing:
         except NotEvaluable:
             wanted += asked
             return None
-        # An open sequence is not copied: what is decided of the copy later would not be decided of it.
+        # An open sequence is not copied: later decisions about the copy would not apply to it.
         return None if asking(value) else (value,)
 
 
@@ -309,25 +310,25 @@ def _forcing(head: Term, value: Term, when: tuple[Term, ...]) -> Forcing | None:
 
 @dataclass(frozen=True, slots=True)
 class Choices:
-    """What an output may be. `values`: of a plain one the values tried, None where they are not known; of a function or
-    a sequence the values that it may have at a point. `why` says what would help where they are not known."""
+    """The possible values of an output. `values`: for a plain one the values tried, None if unknown; for a function or
+    a sequence the values that it may have at a point. `why` says what would help if they are unknown."""
 
     values: tuple[Value, ...] | None
     why: str = ""
     shells: tuple[Value, ...] | None = None
-    """What is tried of an open output to begin with: the open function; open sequences of every length tried."""
+    """The values tried first for an open output: the open function; open sequences of every length tried."""
 
     short: str = ""
-    """In what way `shells` are not all there are."""
+    """In what way `shells` are incomplete."""
 
     restricted: str = ""
-    """In what way `values`, of what has `shells`, are not all there are."""
+    """In what way `values` are incomplete, for an output with `shells`."""
 
     natural: bool = False
-    """Whether it, or what it has at a point, is a natural number."""
+    """Whether the output, or its value at a point, is a natural number."""
 
     def fits(self, value: Value) -> bool:
-        """Whether a value that an equation gives is of its sort: the scenario's values do not matter to it."""
+        """Whether a value that an equation gives is of the output's sort, in the scenario or not."""
         return not (self.natural and isinstance(value, int) and value < 0)
 
     def begin(self) -> tuple[Value, ...] | None:
@@ -335,7 +336,7 @@ class Choices:
 
 
 class Unknown(Exception):  # noqa: N818 - it names a state
-    """An output whose values are not known, and that no equation gives."""
+    """An output has unknown values and no equation gives one."""
 
 
 @dataclass(slots=True)
@@ -343,18 +344,18 @@ class Narrowing:
     """The search for the outputs of one node."""
 
     choices: Mapping[str, Choices]
-    """By ``out.port``."""
+    """The possible values, by ``out.port``."""
     guarantees: tuple[tuple[frozenset[str], Holds], ...]
-    """With the outputs that each mentions. They raise `Undecided`."""
+    """Each with the outputs that it mentions. They raise `Undecided`."""
     forcings: tuple[Forcing, ...]
     incomplete: set[str] = field(default_factory=set)
-    """Why a search that came to its end still is not exhaustive."""
+    """Why a search that ended is still not exhaustive."""
 
     most: int = PARTIAL_ANSWERS
 
     def answers(self, inputs: Mapping[str, Value], limit: int, *, free: bool = False) -> tuple[list[Values], bool]:
-        """Every output that meets the guarantees (with `free`, every output at all), each open where that does not
-        matter; and whether these are all. Raises Undecided where an open input has to be known first, and Unknown."""
+        """Every output that satisfies the guarantees (with `free`, every output at all), open at points that do not
+        matter; and whether these are all. Raises Undecided if an open input has to be decided first, and Unknown."""
         pending = () if free else self.guarantees
         stack: list[tuple[Values, tuple[tuple[frozenset[str], Holds], ...]]] = [({}, pending)]
         found: list[Values] = []
@@ -390,7 +391,7 @@ class Narrowing:
     def _judge(
         self, valuation: Values, outputs: Values, pending: tuple[tuple[frozenset[str], Holds], ...]
     ) -> tuple[tuple[tuple[frozenset[str], Holds], ...], list[tuple[str, Point]]] | None:
-        """The guarantees that are not judged yet, with the points that they ask for; None if one is broken."""
+        """The guarantees that are not judged yet, with the points that they need; None if one is broken."""
         left: list[tuple[frozenset[str], Holds]] = []
         wanted: list[tuple[str, Point]] = []
         for guarantee in pending:
@@ -409,8 +410,8 @@ class Narrowing:
     def _next(
         self, missing: Sequence[str], valuation: Values, free: bool, wanted: list[tuple[str, Point]]
     ) -> tuple[str, tuple[Value, ...]] | None:
-        """The output to choose next, and what it may be: one that an equation gives, else the one with least choice.
-        None where a point has to be decided before: it is added to `wanted`. Raises Unknown."""
+        """The output to choose next, and its possible values: one that an equation gives, otherwise the one with the
+        fewest values. None if a point has to be decided first: it is added to `wanted`. Raises Unknown."""
         best: tuple[str, tuple[Value, ...]] | None = None
         for name in missing:
             begin = self.choices[name].begin()

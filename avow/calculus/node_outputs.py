@@ -1,7 +1,7 @@
-"""What one node answers: given what it reads, which outputs do its guarantees allow, over the scenario's values?
+"""The outputs of one node: given its inputs, which outputs do its guarantees allow, over the scenario's values?
 
-Relations are found by Z3, a bit for each point at which they may hold; everything else by narrowing. Values that are
-open (`avow.calculus.narrowing`) are asked for only where a clause looks at them.
+Z3 finds relations, with one bit for each point at which they may hold; narrowing finds everything else. Open values
+(`avow.calculus.narrowing`) are decided only where a clause reads them.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ def by_variable(node: Node, values: Values) -> dict[Variable, Value]:
 
 
 def definition(guarantees: Sequence[Clause], port: Port) -> tuple[tuple[Variable, ...], Term] | None:
-    """``forall(x | out.p(x) <=> body)`` gives x and body, if body does not speak of outputs."""
+    """For ``forall(x | out.p(x) <=> body)``: x and body, if body does not mention outputs."""
     for clause in guarantees:
         formula = clause.formula
         if not (isinstance(formula, Quantified) and formula.quantifier is Quantifier.FORALL):
@@ -66,9 +66,9 @@ def search(
     seed: int,
     effort: int,
 ) -> tuple[list[Values], bool]:
-    """Every choice of outputs that meets the constraints: a bit for each point of a relation, found by Z3.
+    """Every choice of outputs that satisfies the constraints, found by Z3 with one bit for each point of a relation.
 
-    Says too whether these are all. Raises CannotRun where Z3 cannot decide.
+    Also returns whether these are all. Raises CannotRun if Z3 cannot decide.
     """
     translator = Translator()
     solver = z3.Solver(ctx=translator.context)
@@ -119,8 +119,8 @@ def search(
 
 @dataclass(frozen=True, slots=True)
 class Stuck:
-    """A node to whose inputs no output answers; without one, the environment, which can give nothing as it is assumed
-    to. `genuine`: by its contract, not only among the scenario's values."""
+    """A node without an output for its inputs; without a node, the environment, which has no value as it is assumed to.
+    `genuine`: by its contract, not only among the scenario's values."""
 
     node: str
     inputs: tuple[tuple[str, str], ...]
@@ -137,7 +137,7 @@ class Stuck:
 
 
 class Doubts:
-    """Why what a search finds is less than it seems."""
+    """The reasons why a search's result is weaker than it seems."""
 
     def __init__(self) -> None:
         self.incomplete: set[str] = set()
@@ -147,10 +147,10 @@ class Doubts:
 
 
 def judge(world: World, formula: Term, *, finite: bool = False, doubts: Doubts | None = None, about: str = "") -> Holds:
-    """Whether a formula holds: exactly if that can be had, else with quantifiers over the scenario's values (which is
-    noted among the `doubts`). `finite`: over the scenario's values in any case. The result raises Undecided where an
-    open value has to be known first."""
-    # Evaluation takes a free variable of a system for one that has yet to be found, unless it is an input.
+    """Whether a formula holds: exactly if possible, otherwise with quantifiers over the scenario's values (which is
+    noted among the `doubts`). `finite`: over the scenario's values in any case. The result raises Undecided if an open
+    value has to be decided first."""
+    # Evaluation treats a free variable of a system as unknown, unless it is an input.
     given = {v: Variable(Role.INPUT, f"={v.name}", v.sort) for v in free_variables(formula) if v.role is Role.BOUND}
     names = [(v.name, known.qualified) for v, known in given.items()]
     own = {known.qualified: v.name for v, known in given.items()}
@@ -186,7 +186,7 @@ def judge(world: World, formula: Term, *, finite: bool = False, doubts: Doubts |
 
 
 def possible(world: World, node: str, port: Port) -> Choices:
-    """What an output that is no relation may be."""
+    """The values that an output may have, if it is not a relation."""
     sort = port.sort
     cut = f"{node}.{port.name} may have values at some point that the scenario's leave out"
     try:
@@ -203,7 +203,7 @@ def possible(world: World, node: str, port: Port) -> Choices:
                 items = world.plain_values(item)
                 restricted = cut if items is not None and not _are_all(items, item) else ""
                 return Choices(items, unknown, shells, short, restricted)
-            case _:  # any sort whose values can be tried
+            case _:  # any other sort
                 return Choices(world.candidates(node, port), natural=isinstance(sort, NaturalSort))
     except CannotRun as reason:
         shells = (FunctionValue({}, ANY),) if isinstance(sort, FunctionSort) else None  # type: ignore[assignment]
@@ -218,7 +218,7 @@ def _are_all(values: Sequence[Value], sort: Sort) -> bool:
 
 
 def is_restricted(node: Answerer, port: Port) -> bool:
-    """Whether not every value of an output's sort is tried; of functions, and of sequences element by element, at some
+    """Whether some value of an output's sort is not tried; for functions, and for sequences element by element, at some
     point."""
     choices = node.choices.get(f"out.{port.name}")
     if choices is None or isinstance(port.sort, OpaqueSort):
@@ -229,7 +229,7 @@ def is_restricted(node: Answerer, port: Port) -> bool:
 
 
 class Answerer:
-    """One node: its clauses compiled, its answers remembered. Raises CannotRun."""
+    """One node with its compiled clauses and its cached answers. Raises CannotRun."""
 
     def __init__(self, world: World, node: Node, seed: int, doubts: Doubts) -> None:
         self.node, self.world, self.seed, self.doubts = node, world, seed, doubts
@@ -260,11 +260,11 @@ class Answerer:
         self.assumed = tuple(f"in.{p.name}" for p in node.inputs if p.name in assumed)
         """Inputs that the assumptions mention."""
         self.shapes = self._shapes()
-        """The searched relations that the guarantees allow whatever the inputs; None where that is no help."""
+        """The searched relations that the guarantees allow for any inputs; None if that does not help."""
         self._answers: dict[object, tuple[Values, ...]] = {}
         self._broken: dict[object, tuple[str, ...]] = {}
         self.asked: dict[object, Values] = {}
-        """The inputs of each question, by its place among the answers."""
+        """The inputs of each query, by its key among the answers."""
 
     def _judge(self, clause: Clause) -> Holds:
         about = f"{self.node.name}.{clause.name}"
@@ -275,7 +275,7 @@ class Answerer:
         return frozenset(v.qualified for v in ports_of(clause.formula) if v.qualified in self.others)
 
     def _shapes(self) -> tuple[Values, ...] | None:
-        """Found once, these need only be held against the other guarantees for each input."""
+        """These are found once; for each input, only the other guarantees are checked."""
         own = {port.variable for port, _ in self.searched}
         about = [clause.formula for clause in self.node.guarantees if set(ports_of(clause.formula)) <= own]
         if not self.searched or not about:
@@ -286,7 +286,7 @@ class Answerer:
     # -- answers -------------------------------------------------------------------------------------------------------
 
     def broken(self, inputs: Values) -> tuple[str, ...]:
-        """The assumptions that do not hold of the inputs. Raises Undecided."""
+        """The assumptions that do not hold for the inputs. Raises Undecided."""
         place = tuple([key(inputs[name]) for name in self.assumed])
         found = self._broken.get(place)
         if found is None:
@@ -295,8 +295,8 @@ class Answerer:
         return found
 
     def answers(self, inputs: Values, *, free: bool = False) -> tuple[tuple[Values, ...], tuple[str, ...]]:
-        """Every output (by port) that meets the guarantees, given the inputs: all of them, where an assumption is
-        broken, or the node is `free`. And the assumptions that are. Raises Undecided."""
+        """Every output (by port) that satisfies the guarantees, given the inputs, or any output if an assumption is
+        broken or the node is `free`; and the broken assumptions. Raises Undecided."""
         broken = self.broken(inputs)
         free = free or bool(broken)
         index = (free, *[key(inputs[name]) for name in self.read])
@@ -307,7 +307,7 @@ class Answerer:
         return found, broken
 
     def found(self, index: object) -> tuple[Values, ...]:
-        """What was answered at a place of `asked`."""
+        """The answer for a key of `asked`."""
         return self._answers[index]
 
     def _solve(self, inputs: Values, free: bool) -> tuple[Values, ...]:
@@ -334,7 +334,7 @@ class Answerer:
     def _found_by_z3(
         self, inputs: Values, relations: Values, searched: Sequence[tuple[Port, tuple[Point, ...]]], free: bool
     ) -> tuple[Values, ...]:
-        """Relations and plain outputs together; or the relations alone, if other outputs cannot be put to Z3 so."""
+        """Relations and plain outputs together, or relations alone if other outputs cannot be given to Z3 that way."""
         plain = [(port, self.choices[name].values) for name, port in self.others.items()]
         lazy = FunctionSort | SequenceSort
         together = [(port, values) for port, values in plain if values is not None and not isinstance(port.sort, lazy)]
@@ -369,7 +369,7 @@ class Answerer:
     # -- no answer -----------------------------------------------------------------------------------------------------
 
     def stuck(self, inputs: Values) -> Stuck:
-        """Is there really no output, or only none in the scenario? Z3 knows the contract without the scenario."""
+        """Is there really no output, or only none in the scenario? Z3 has the contract without the scenario."""
         node = self.node
         shown = tuple((name, show(value)) for name, value in inputs.items() if name in self.read)
         names = tuple(clause.name for clause in node.guarantees)
@@ -393,7 +393,7 @@ class Answerer:
 
 
 def meanings_of(translator: Translator, solver: z3.Solver, node: Node, inputs: Values) -> dict[Variable, Meaning]:
-    """The values of the inputs; what is decided of open ones goes to the solver."""
+    """The values of the inputs; the decided points of open ones are added to the solver."""
     meanings: dict[Variable, Meaning] = {}
     for variable, value in by_variable(node, inputs).items():
         if is_open(value):
@@ -404,7 +404,7 @@ def meanings_of(translator: Translator, solver: z3.Solver, node: Node, inputs: V
 
 
 def decided(translator: Translator, variable: Variable, value: Value) -> list[object]:
-    """What is decided of an open value."""
+    """The decided points of an open value, as Z3 facts."""
     match value, variable.sort:
         case FunctionValue(table=table), FunctionSort(parameters=parameters, result=result):
             function = translator.function(variable)

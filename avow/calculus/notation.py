@@ -1,7 +1,7 @@
 """Derivations as the paper writes them: premises, linking equations, side conditions, a line, the conclusion.
 
-One structure (`Lines`) is printed in three ways, as text, as an HTML fragment and as LaTeX, so that they cannot differ.
-Names come from contracts and are escaped by each printer.
+One structure (`Lines`) is printed as text, as an HTML fragment and as LaTeX, so that these cannot differ. Names come
+from contracts; each printer escapes them.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ _LATEX = {
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """One line of a derivation. `remark` is in words."""
+    """One line of a derivation. `remark` is prose."""
 
     parts: tuple[Part, ...]
     remark: str = ""
@@ -90,7 +90,7 @@ class Written:
     """Nodes, or names of other derivations of this system."""
     side_conditions: tuple[Condition, ...]
     conditional: tuple[str, ...]
-    """Hypotheses of the conclusion: local ids of obligations where there are such, else words."""
+    """Hypotheses of the conclusion: local ids of obligations if there are any, otherwise prose."""
     findings: tuple[str, ...] = ()
 
 
@@ -109,7 +109,7 @@ def write_goal(goal: Goal, settled: Mapping[SideCondition, Settled] | None = Non
     )
     conditional: list[str] = []
     prefix = f"{SYSTEM_LEVEL}/{Kind.COMPOSITION}"
-    for part in reversed(goal.inner_first()):  # what is conditional inside is conditional outside
+    for part in reversed(goal.inner_first()):  # a hypothesis of an inner derivation is one of the outer
         if part.needs_persistence:
             conditional += [f"{prefix}/{part.name}.persistence", f"{prefix}/{part.name}.one-output"]
     conditional += [f"assumed: {name}" for name in goal.root.assumed]
@@ -173,7 +173,7 @@ def _applied(kind: str, node: str) -> tuple[Part, ...]:
 
 
 def _linking(part: Derivation) -> Iterator[Line]:
-    """``i_A = o_N ∪ o_R``, one line for each consumer; what the paper leaves out is remarked."""
+    """``i_A = o_N ∪ o_R``, one line for each consumer; remarks give what the paper leaves out."""
     by_consumer: dict[str, list[Edge]] = {}
     for edge in part.linking:
         by_consumer.setdefault(edge.target.node, []).append(edge)
@@ -191,7 +191,7 @@ def _linking(part: Derivation) -> Iterator[Line]:
 
 
 def _condition_lines(part: Derivation, settled: Mapping[SideCondition, Settled]) -> Iterator[Line]:
-    """One line for each consumer, as the paper has it; which of its assumptions rests on what is remarked."""
+    """One line for each consumer, as in the paper; remarks say what each of its assumptions follows from."""
     consumers = tuple(dict.fromkeys(condition.consumer for condition in part.side_conditions))
     for number, consumer in enumerate(consumers):
         if number >= RULE_NODES:

@@ -1,7 +1,7 @@
 """Composition and requirement obligations: what has to be shown for the system's derivations to hold.
 
-Each obligation is made from a `Task`, which says how it is settled (`avow.calculus.discharge` asks the solver). What an
-answer rests on is given as other obligations, which the assurance case then requires.
+Each obligation is made from a `Task`, which says how it is answered (`avow.calculus.discharge` calls the solver). The
+hypotheses of an answer are given as other obligations, which the assurance case then requires.
 """
 
 from __future__ import annotations
@@ -43,34 +43,33 @@ from avow.system.plan import System
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """An obligation, and the question that settles it."""
+    """An obligation, and the question that answers it."""
 
     obligation: Obligation
     ask: questions.Question
 
     @property
     def because(self) -> str:
-        """The plan's reason, which answers it: no part of the claim. Empty where a question alone does."""
+        """The plan's reason, which answers the obligation but is not part of the claim; empty if it needs no reason."""
         return (
             self.ask.because if isinstance(self.ask, questions.ArgumentQuestion | questions.EnvironmentQuestion) else ""
         )
 
 
 def composition_obligations(system: System) -> tuple[Obligation, ...]:
-    """Every composition obligation of a system. Pure. Raises Rejected for a plan whose formulas are wrong."""
+    """Every composition obligation of a system. Pure. Raises Rejected if the plan's formulas are wrong."""
     return tuple(task.obligation for task in _tasks(composed(system)))
 
 
 def all_tasks(composition: Composition) -> tuple[Task, ...]:
-    """What has to be shown for derivations that are made already, and an obligation for each requirement that has a
-    formula or a temporal property; one in prose has none: it is linked, and the assurance case shows it as linked. With
-    what settles each. Raises Rejected for a formula that is wrong."""
+    """The obligations for existing derivations, and one for each requirement with a formula or a temporal property,
+    each with its question. A requirement in prose has none: the assurance case shows it as linked. Raises Rejected if a
+    formula is wrong."""
     return (*_tasks(composition), *_requirements(composition))
 
 
 def settle_each(composition: Composition, obligations: Sequence[Obligation], bounds: Bounds) -> Iterator[Outcome]:
-    """One outcome for each obligation, in their order, each as soon as it is there. The derivations remember what was
-    settled."""
+    """One outcome for each obligation, in order, each as soon as it is known. The derivations cache the answers."""
     made = tuple(_tasks(composition))
     resting = _resting(composition, made)
     tasks = {task.obligation.id: task for task in (*made, *_requirements(composition))}
@@ -97,8 +96,8 @@ def _claimed(made: Sequence[Task], wanted: frozenset[str]) -> dict[str, dict[Sid
 
 
 def reestablished(certificates: Certificates, obligation: str) -> Reestablished | None:
-    """What the kernel says of an obligation (by its id) from the certificates kept; None where it does not establish
-    it. Nothing is searched for."""
+    """The kernel's result for an obligation (by its id) from the kept certificates, without a search; None if it does
+    not establish it."""
     _, _, kind, name = obligation.split("/", 3)
     if kind == Kind.REQUIREMENT:
         scope = requirement_scope(name)
@@ -237,8 +236,8 @@ def _start_tasks(composition: Composition) -> Iterator[Task]:
 
 
 def _joint_tasks(composition: Composition) -> Iterator[Task]:
-    """Guarantees that feed one another at one instant may leave each other no room. Where values flow one way only,
-    each node answers to what it gets, and its own realizability (a sanity obligation) is enough."""
+    """Guarantees of nodes that feed one another at one instant may be inconsistent. If values flow one way only, each
+    node responds to its inputs, and its own realizability (a sanity obligation) is enough."""
     frame = composition.frame
     arcs = [(e.source.node, e.target.node) for e in frame.graph.edges if not e.delayed]
     for group in circles(frame):
@@ -294,7 +293,7 @@ def _task(
     clauses: Iterable[str] = (),
     span: Span | None = None,
 ) -> Task:
-    """`meaning`: what the digest is of."""
+    """`meaning`: the texts that the digest covers."""
     mark, system = sha256("\n".join(meaning)), frame.system.name
     return Task(Obligation(system, SYSTEM_LEVEL, kind, name, claim, formula, mark, tuple(clauses), span), ask)
 
@@ -308,12 +307,12 @@ def _sources(condition: SideCondition) -> str:
 
 @dataclass(frozen=True, slots=True)
 class _Given:
-    """A provider's names, made once for all its consumers."""
+    """A provider's clause names, computed once for all its consumers."""
 
     guarantees: tuple[str, ...]
     """Innermost names."""
     clauses: str
-    """Of all clauses, as one conjunction."""
+    """The names of all clauses, as one conjunction."""
 
 
 def _given(frame: Frame, name: str) -> _Given:
@@ -330,7 +329,7 @@ def _implication(frame: Frame, condition: SideCondition, given: Mapping[str, _Gi
 
 
 def _loop_name(composition: Composition, goal: Goal, part: Derivation) -> str:
-    """What an assumption of a node that is called ``loop`` cannot be called: no name of a node has a hyphen."""
+    """A name that no assumption of a node named ``loop`` can have: names of nodes have no hyphen."""
     word = "loop-of" if "loop" in composition.frame_of(goal).graph.nodes else "loop"
     return f"{goal.name}.{word}.{joined(part.nodes)}"
 
@@ -344,14 +343,14 @@ def _listed(names: Sequence[str]) -> str:
 
 @dataclass(frozen=True, slots=True)
 class _Resting:
-    """What an answer of the calculus rests on, as hypotheses that the case discharges: obligations, by what they say.
+    """What an answer of the calculus depends on, as hypotheses that the case discharges: obligations, by digest.
     `obligations`: the composition's, by name."""
 
     composition: Composition
     obligations: Mapping[str, Obligation]
 
     def behind(self, answer: Answer, goal: str | None, required: str = "") -> tuple[Hypothesis, ...]:
-        """What an answer about a side condition of a derivation rests on, or about a requirement (`goal` None)."""
+        """The hypotheses of an answer about a side condition of a derivation, or about a requirement (`goal` None)."""
         found: dict[Hypothesis, None] = {}
         if answer.everything:
             found |= dict.fromkeys(self.everything())
@@ -366,7 +365,7 @@ class _Resting:
         return tuple(found)
 
     def constants(self, established: Established, required: str) -> Iterator[Hypothesis]:
-        """That the inputs of which a proof's clauses speak do not change, where the plan says so."""
+        """Hypotheses that inputs mentioned in a proof's clauses do not change, if the plan declares them constant."""
         frame, known = self.composition.frame, self.composition.certificates.known
         about = frame.required.get(required)
         spoken = [] if about is None else [v.name.rsplit(".", 1) for v in ports_of(about) if "." in v.name]
@@ -381,7 +380,7 @@ class _Resting:
                 yield self.composed(f"environment.{entry.constancy}")
 
     def everything(self) -> Iterator[Hypothesis]:
-        """Every guarantee, what discharges every assumption, and what makes their values belong together."""
+        """Every guarantee, what discharges every assumption, and hypotheses that their values belong to one step."""
         frame = self.composition.frame
         for node in frame.system.contract.nodes:
             yield from (h for clause in node.guarantees for h in self.guarantee(node.name, clause.name))
@@ -412,7 +411,7 @@ class _Resting:
         return f"{found.node}.{found.name}"
 
     def guarantee(self, node: str, clause: str) -> tuple[Hypothesis, ...]:
-        """What has to be shown of it: nothing of what stands for a topic's wiring, as of any link."""
+        """The guarantee's obligation; none for a node that represents a topic's wiring."""
         owner = self.composition.frame.system.contract.node(node)
         if owner.relay:
             return ()
@@ -420,7 +419,7 @@ class _Resting:
         return (Hypothesis(HypothesisKind.CLAIM, f"{node}/{Kind.GUARANTEE}/{clause}", mark),)
 
     def discharging(self, node: str, clause: str) -> Hypothesis:
-        """The obligation that settles an assumption of a node."""
+        """The obligation that discharges an assumption of a node."""
         shown = self.composition.where(node, clause)
         if shown is not None:
             goal, about = shown
@@ -428,7 +427,7 @@ class _Resting:
         return self.composed(f"environment.{node}.{clause}")
 
     def composed(self, name: str) -> Hypothesis:
-        """A composition obligation; where there is none of that name, a person has to accept what it would say."""
+        """A composition obligation; if there is none of that name, an assumption that a person has to accept."""
         obligation = self.obligations.get(name)
         if obligation is not None:
             return Hypothesis(HypothesisKind.CLAIM, obligation.local_id, obligation.digest)
@@ -437,8 +436,8 @@ class _Resting:
         )
 
     def together(self, nodes: Iterable[str], goal: str | None, *, optional: bool = False) -> tuple[Hypothesis, ...]:
-        """Persistence and one output for each input, of a derivation over these nodes: the one in question, one for
-        which the plan gives reasons, or any."""
+        """Persistence and one output for each input, for a derivation over these nodes: preferably the given one, then
+        one for which the plan gives reasons, then any."""
         wanted, composition = frozenset(nodes), self.composition
         if any(name.startswith(OBSERVED) for name in wanted):
             wanted = frozenset(composition.frame.graph.nodes)
@@ -462,7 +461,7 @@ def _resting(composition: Composition, tasks: Iterable[Task]) -> _Resting:
 
 
 def discharged_by(composition: Composition) -> dict[str, tuple[Hypothesis, ...]]:
-    """For each node what discharges its assumptions: who relies on one of its guarantees relies on these."""
+    """For each node what discharges its assumptions: every use of its guarantees depends on these."""
     resting = _resting(composition, _tasks(composition))
     return {
         node.name: tuple(dict.fromkeys(resting.discharging(node.name, clause.name) for clause in node.assumptions))

@@ -1,9 +1,9 @@
-"""Can what a node assumes of its inputs ever come from the nodes that they are connected to?
+"""Can the nodes that feed an input ever satisfy what the consumer assumes about it?
 
-A side condition of the calculus asks whether the providers' guarantees *imply* an assumption. Here is the question
-before that one: do they leave room for it? If they contradict it, then no implementation of the providers makes the
-consumer's contract apply, and verifying against that contract is in vain. It is a sanity claim of the consumer that
-only the whole system can settle.
+A side condition of the calculus asks whether the providers' guarantees *imply* an assumption. This module asks an
+earlier question: are they consistent with it? If they contradict it, no implementation of the providers makes the
+consumer's contract apply, and verifying against that contract is pointless. This is a sanity claim of the consumer that
+only the whole system can decide.
 """
 
 from __future__ import annotations
@@ -35,17 +35,17 @@ from avow.system.plan import Endpoint
 
 @dataclass(frozen=True, slots=True)
 class ProviderClaim:
-    """That the providers of an assumption's inputs leave room for it."""
+    """The claim that an assumption is consistent with the providers of its inputs."""
 
     claim: Claim
     digest: str
-    """SHA-256 of the assumption, the providers' contracts and what the plan assumes of the environment."""
+    """SHA-256 of the assumption, the providers' contracts and the plan's environment assumptions."""
     assumed: Mapping[str, Term]
-    """The assumption, and what the plan assumes of the environment that bears on it, by label."""
+    """The assumption, and the plan's environment assumptions that bear on it, by label."""
     promised: tuple[Mapping[str, Term], ...]
     """The contracts of the providers of its inputs, each by ``node.clause``."""
     first: Mapping[str, Term] = field(default_factory=dict)
-    """What is remembered before the first step, of all that these formulas remember."""
+    """The initial values of all cells that these formulas mention."""
 
     @property
     def clause(self) -> str:
@@ -59,18 +59,18 @@ class ProviderClaim:
 
     @property
     def formulas(self) -> dict[str, Term]:
-        """All that is to hold together."""
+        """All formulas that have to hold together."""
         return dict(chain.from_iterable(part.items() for part in (self.assumed, *self.promised)))
 
 
 def provider_claims(whole: Frame, node: Node) -> tuple[ProviderClaim, ...]:
-    """A claim for each assumption of a node that says something of a connected input."""
+    """A claim for each assumption of a node about a connected input."""
     found = (_claim(whole, node, clause) for clause in node.assumptions if clause.formula != TRUE)
     return tuple(claim for claim in found if claim is not None)
 
 
 def settle(claims: Sequence[ProviderClaim], node: Node, bounds: Bounds) -> tuple[SanityResult, ...]:
-    """Ask whether the assumptions can be met."""
+    """Check whether the assumptions can be met."""
     return tuple(_settle(claim, node, bounds) for claim in claims)
 
 
@@ -94,9 +94,9 @@ def _claim(whole: Frame, node: Node, clause: Clause) -> ProviderClaim | None:
     given = {(e.source.node, int(e.delayed)): whole.promised(e.source.node, int(e.delayed)) for e in edges}
     goal = whole.clause(node.name, clause.name)
     spoken = free_variables(goal)
-    if whole.environment() or whole.blank():  # of many consumers each would go through all that the provider promises
+    if whole.environment() or whole.blank():  # otherwise not needed, and slow with many consumers
         spoken = spoken.union(*(p.speaking for p in given.values()))
-    # what is not tied to these variables cannot exclude anything here
+    # facts without a connection to these variables cannot exclude anything here
     assumed = {about: goal} | bearing(whole.environment(), spoken)
     providers = tuple(dict.fromkeys(provider for provider, _ in given))
     names = " and ".join(providers)
@@ -117,7 +117,7 @@ def _claim(whole: Frame, node: Node, clause: Clause) -> ProviderClaim | None:
 
 @by_identity(20_000)
 def _guarantees(node: Node) -> tuple[str, ...]:
-    """The names of what many others may read."""
+    """The names of a node's guarantees; cached, as many consumers may read them."""
     return tuple(f"{node.name}.{clause.name}" for clause in node.guarantees)
 
 
@@ -148,7 +148,7 @@ def _settle(asked: ProviderClaim, node: Node, bounds: Bounds) -> SanityResult:
             verb = "excludes" if len(others) == 1 else "exclude"
             verdict, text = Verdict.REFUTED, f"no provider can meet it: {listing(others)} {verb} it"
         case "unsat":
-            # The providers' own contracts leave no room for anything: a finding of theirs.
+            # The providers' own contracts are inconsistent: a finding about them.
             verdict, text = Verdict.REFUTED, f"{listing(answer.core)} cannot hold together: no value comes from there"
             because = f"{answer.core[0].partition('.')[0]}/consistent"
         case "unknown":

@@ -31,7 +31,7 @@ from avow.solving.sizes import in_every_size
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """An `Outcome` before it is known of which obligation."""
+    """An `Outcome` whose obligation is not yet known."""
 
     verdict: Verdict
     summary: str
@@ -43,9 +43,9 @@ class Answer:
     vacuous: bool = False
     link: Link = Link.GENERATED
     established: Established | None = None
-    """What the kernel says of it: no answer of the calculus is `proved` without."""
+    """The kernel's result: without it, no answer of the calculus is `proved`."""
     everything: bool = False
-    """It rests on every guarantee of every node, and on whatever discharges their assumptions."""
+    """It depends on every guarantee of every node, and on whatever discharges their assumptions."""
 
     def outcome(self, obligation: str, rests_on: tuple[Hypothesis, ...] = ()) -> Outcome:
         return Outcome(
@@ -63,7 +63,7 @@ class Answer:
 
 
 class Question(Protocol):
-    """Settles one obligation."""
+    """Answers one obligation."""
 
     def __call__(self, composition: Composition, bounds: Bounds) -> Answer: ...
 
@@ -91,9 +91,9 @@ class SideQuestion:
 
 
 def certified(answer: Answer, found: Established | None, *, late: bool, fallen: Sequence[str] = ()) -> Answer:
-    """A proof that was found, if the kernel establishes it. If it does not, and a question to Z3 ran out of time
-    (`late`), the verdict is `error`: a faster machine might answer. `fallen`: side conditions that do not hold, which
-    may be why."""
+    """The answer for a proof that was found: proved if the kernel establishes it. If not, and a Z3 query ran out of
+    time (`late`), the verdict is `error`: a faster machine might answer. `fallen`: side conditions that do not hold,
+    which may be the reason."""
     if found is None:
         text = f"a proof was found ({answer.summary}), but the kernel could not establish it"
         if fallen:
@@ -106,8 +106,8 @@ def certified(answer: Answer, found: Established | None, *, late: bool, fallen: 
 
 
 def as_far_as_shown(frame: Frame, answer: Answer) -> Answer:
-    """A refutation by a step or a run that keeps to every clause; unknown where a clause was left out, which may
-    exclude just that step or run. A circle of proofs is one whatever else is said."""
+    """The answer, with a refutation turned into unknown if a clause was left out that may exclude the step or run
+    shown. A circular proof stays a refutation in any case."""
     if not frame.left_out or answer.verdict is not Verdict.REFUTED or "circle" in answer.details:
         return answer
     kept = {key: value for key, value in answer.details.items() if key not in ("would_hold_if", "run")}
@@ -120,12 +120,12 @@ def as_far_as_shown(frame: Frame, answer: Answer) -> Answer:
 
 
 def _not_kept_to(frame: Frame) -> str:
-    """Why an example need not be one: `Frame.left_out`."""
+    """Why a counterexample may be spurious: `Frame.left_out`."""
     return f"what has no formula of one step is left out, and may exclude it: {', '.join(frame.left_out)}"
 
 
 def _side_answer(frame: Frame, settled: Settled, repairs: Sequence[tuple[Phase, tuple[Offer, ...]]] = ()) -> Answer:
-    """A settled side condition in words; `repairs`: what would make its refuted cases hold."""
+    """The answer for a checked side condition; `repairs`: clauses that would make its refuted cases hold."""
     condition = settled.condition
     details: dict[str, object] = {
         "consumer": condition.consumer,
@@ -175,7 +175,7 @@ def _side_answer(frame: Frame, settled: Settled, repairs: Sequence[tuple[Phase, 
 
 
 def would_hold_if(found: Sequence[Offer], when: str = "") -> str:
-    """To be put after a refutation's words; nothing where nothing is offered."""
+    """The text to append to a refutation's summary; empty without an offer."""
     return f"; {when}it would hold if {', or if '.join(offer.text for offer in found)}" if found else ""
 
 
@@ -227,7 +227,7 @@ def _counterexample(case: Case, condition: SideCondition) -> Counterexample | No
 
 @dataclass(frozen=True, slots=True)
 class RuleQuestion:
-    """A rule that the plan names and that does not fit: nothing is left to ask."""
+    """A rule that the plan names and that does not fit: refuted without a query."""
 
     message: str
 
@@ -236,13 +236,13 @@ class RuleQuestion:
 
 
 def common_key(found: Sequence[Established]) -> str:
-    """The key of an answer that several claims make up: a loop's, the side conditions of its members.
-    That of one claim is its own."""
+    """The key of an answer made up of several claims (for a loop, the side conditions of its members); for one claim,
+    its own key."""
     return found[0].key if len(found) == 1 else sha256("".join(one.key for one in found))
 
 
 def made_up(answer: Answer, found: Sequence[Established] | None, *, late: bool) -> Answer:
-    """As `certified`, of a proof that several claims make up."""
+    """The same as `certified`, for a proof made up of several claims."""
     if found is None:
         return certified(answer, None, late=late)
     told = {"key": common_key(found), "solvers": min((one.solvers for one in found), default=1)}
@@ -250,7 +250,7 @@ def made_up(answer: Answer, found: Sequence[Established] | None, *, late: bool) 
 
 
 def _counted(found: tuple[Verdict, str]) -> Answer:
-    """What hinges on how many elements an unspecified type has."""
+    """The answer for a claim that depends on how many elements an unspecified type has."""
     verdict, why = found
     return Answer(verdict, why, Counterexample(explanation=why) if verdict is Verdict.REFUTED else None)
 
@@ -333,7 +333,7 @@ class StartQuestion:
 
 @dataclass(frozen=True, slots=True)
 class ArgumentQuestion:
-    """Has the plan a reason? Nothing more is asked: it is a person's."""
+    """Does the plan give a reason? Nothing more is checked: a person judges the reason."""
 
     key: str
     because: str
@@ -352,12 +352,12 @@ def _without_reason(where: str) -> Answer:
 
 @dataclass(frozen=True, slots=True)
 class EnvironmentQuestion:
-    """Has the plan a reason for what it assumes of the environment? Can all that is assumed of it together go on for
-    ever, and can what each guarantee is about still come about? Else what follows from it says nothing."""
+    """Does the plan give a reason for what it assumes about the environment? Can all these assumptions hold together
+    for ever, and can each guarantee's condition still arise? Otherwise everything that follows is vacuous."""
 
     because: str
     label: str = ""
-    """Of what is assumed (`Composition.assumed`); none where it is that an input is constant."""
+    """The label of the assumption (`Composition.assumed`); empty if the assumption is that an input is constant."""
 
     def __call__(self, composition: Composition, bounds: Bounds) -> Answer:
         if not self.because:
@@ -377,7 +377,7 @@ class EnvironmentQuestion:
         return Answer(Verdict.JUSTIFIED, self.because, link=Link.GUIDED)
 
     def _excluded(self, composition: Composition) -> Iterator[str]:
-        """The guarantees whose condition this keeps from coming about, which their nodes' contracts do not."""
+        """The guarantees whose condition this assumption makes impossible, while their nodes' contracts do not."""
         frame, environment = composition.frame, composition.assumed()
         about = ports_of(environment[self.label])
         for node in (name for name in frame.graph.nodes if not self.label.startswith(f"{name}.")):
@@ -396,7 +396,7 @@ class EnvironmentQuestion:
 
 @dataclass(frozen=True, slots=True)
 class JointQuestion:
-    """Can the situation that a guarantee is about arise, when all of a circle's guarantees hold at one instant?"""
+    """Can the situation that a guarantee is about arise when all guarantees of a cycle hold at one instant?"""
 
     members: tuple[str, ...]
     node: str

@@ -1,9 +1,8 @@
 """Refinement: may one node stand in for another? Weaker assumptions, stronger guarantees.
 
-A refines B if whatever B's environment provides is enough for A, and whatever A then guarantees is what B promises:
-assumptions of B imply those of A; these and A's guarantees imply B's guarantees. Of a contract that nothing can keep
-all this is true and says nothing: whether A has an output for every input that B allows is asked as well.
-Of clauses that speak of other steps it is asked of every run: as long as B's assumptions have held.
+A refines B if B's assumptions imply those of A, and these together with A's guarantees imply B's guarantees. A contract
+that nothing can keep refines vacuously, so it is also checked that A has an output for every input that B allows.
+Clauses that mention other steps are checked over every run, as long as B's assumptions have held.
 """
 
 from __future__ import annotations
@@ -57,10 +56,10 @@ class Demand:
 
 @dataclass(frozen=True, slots=True)
 class Refinement:
-    """Whether `concrete` refines `abstract`. `faults`: ports that do not fit; then nothing else is asked.
+    """Whether `concrete` refines `abstract`. `faults`: ports that do not fit; then nothing else is checked.
 
     `unrealizable`: an input that `abstract` allows, and the guarantees of `concrete` that no output meets there;
-    `doubt`: why it is not known whether there is one.
+    `doubt`: why it is unknown whether there is one.
     """
 
     concrete: str
@@ -70,11 +69,11 @@ class Refinement:
     unrealizable: Counterexample | None = None
     doubt: str = ""
     certificates: tuple[Certificate, ...] = ()
-    """What the kernel established it from."""
+    """The certificates from which the kernel established it."""
 
     @property
     def verdict(self) -> Verdict:
-        """`proved` only where it is known as well that something can keep `concrete`, or that nothing can."""
+        """`proved` only if it is also known whether anything can keep `concrete`."""
         found = self._demanded
         undecided = found is Verdict.PROVED and bool(self.doubt) and not self._hollow
         return Verdict.UNKNOWN if undecided else found
@@ -92,12 +91,12 @@ class Refinement:
 
     @property
     def vacuous(self) -> bool:
-        """It is true, but only of a contract that nothing can keep (or of assumptions that nothing meets)."""
+        """It holds, but only because nothing can keep the contract (or nothing meets the assumptions)."""
         return self.verdict is Verdict.PROVED and self._hollow
 
     @property
     def holds(self) -> bool:
-        """Whether the one may stand in for the other."""
+        """Whether `concrete` may replace `abstract`."""
         return self.verdict is Verdict.PROVED and not self.vacuous
 
 
@@ -105,7 +104,7 @@ def refines(
     concrete: Node, abstract: Node, bounds: Bounds | None = None, renames: Mapping[str, str] | None = None
 ) -> Refinement:
     """Does the first node refine the second? Ports are matched by name, after `renames` (the first node's name of a
-    port → the second's); types by what they are, not by their names."""
+    port → the second's); types are matched by structure, not by name."""
     bounds = bounds or Bounds()
     concrete = renamed(concrete, renames or {})
     faults = _ports(concrete, abstract)
@@ -158,13 +157,13 @@ def _realized(found: Refinement, concrete: Node, abstract: Node, bounds: Bounds)
             return replace(found, unrealizable=run)
         case Verdict.PROVED:
             return found
-        case _:  # no answer: a doubt, never a proof
+        case _:  # undecided: a doubt, never a proof
             return replace(found, doubt=reason or NO_ANSWER)
 
 
 def _of_same_ports(concrete: Node, abstract: Node) -> tuple[Node, Node]:
-    """Both nodes over the same ports: the inputs that the second is given, and the outputs that the first gives, in the
-    second's types. Where one has a NATURAL and the other an INTEGER, both then speak of the NATURAL that it is."""
+    """Both nodes over the same ports: the second's inputs, and the first's outputs in the second's types. If one has a
+    NATURAL and the other an INTEGER, both use the NATURAL."""
     recast = _recasting(concrete, abstract)
     given = {port.name: port for port in abstract.inputs}
     inputs = tuple(given[port.name] for port in concrete.inputs)
@@ -186,7 +185,7 @@ def _of_same_ports(concrete: Node, abstract: Node) -> tuple[Node, Node]:
 
 
 def renamed(node: Node, names: Mapping[str, str]) -> Node:
-    """A node with some ports under other names. Another port that has such a name is called otherwise."""
+    """A node with some ports renamed. Another port that already has such a name gets a new one."""
     taken = {*names.values()}
 
     def called(port: Port) -> str:
@@ -240,7 +239,7 @@ def _other_type(concrete: Node, port: Port, abstract: Node, other: Port) -> Diag
 
 
 def _written(port: Port) -> str:
-    """The type as the port's declaration has it, and what that is, if it is a name."""
+    """The type as in the port's declaration, and its definition if it is a name."""
     meant = show_type(port.sort)
     return port.type_name if meant == port.type_name else f"{port.type_name} = {meant}"
 
@@ -250,7 +249,8 @@ def _same(given: Sort, wanted: Sort) -> bool:
 
 
 def _recasting(concrete: Node, abstract: Node) -> Callable[[Term], Term]:
-    """Terms of one file in the sorts of the other: the same type may be declared in each, perhaps by another name."""
+    """Translates terms of one file to the sorts of the other: each may declare the same type, perhaps under another
+    name."""
     others = {port.name: port.sort for port in (*abstract.inputs, *abstract.outputs)}
     mapping: dict[Sort, Sort] = {}
     for port in (*concrete.inputs, *concrete.outputs):
@@ -272,7 +272,7 @@ def _match(one: Sort, other: Sort, mapping: dict[Sort, Sort]) -> None:
     if one == other or sort_digest(one) != sort_digest(other):
         return
     theirs = parts(other)
-    if isinstance(one, DataSort) and isinstance(other, DataSort):  # its constructors may be listed in another order
+    if isinstance(one, DataSort) and isinstance(other, DataSort):  # the order of constructors may differ
         theirs = tuple(p for made in one.constructors for p in other.constructor(made.name).parameters)
     for a, b in zip(parts(one), theirs, strict=True):
         _match(a, b, mapping)
@@ -288,12 +288,12 @@ def _mapped(sort: Sort, mapping: dict[Sort, Sort]) -> Sort:
 
 def _answered(concrete: Node, abstract: Node, bounds: Bounds) -> tuple[tuple[Answer, ...], tuple[Certificate, ...]]:
     """For each assumption of the first node, then each guarantee of the second, whether it follows in every run, by
-    induction over steps; and what the kernel established it from (`Refined` in proofs/instances.dfy). The types of both
-    are the same.
+    induction over steps; and the certificates from which the kernel established it (`Refined` in proofs/instances.dfy).
+    Both have the same types.
 
-    The refining node stands alone in a system, of whose environment the refined node's assumptions are assumed. First
-    its assumptions are required, of whatever it puts out: its guarantees hold only where these do, and may not be used.
-    Then the refined node's guarantees are required of what it guarantees, where all assumptions of both hold.
+    The refining node is a system of its own, with the refined node's assumptions as environment assumptions. First its
+    assumptions are required for any outputs: its guarantees hold only if these do, and may not be used. Then the
+    refined node's guarantees are required, given its guarantees and all assumptions of both.
     """
     alone = replace(concrete, inputs=abstract.inputs, topics=(), assumptions=())
     given = abstract.assumptions
@@ -313,7 +313,7 @@ def _answered(concrete: Node, abstract: Node, bounds: Bounds) -> tuple[tuple[Ans
 def _required(
     node: Node, assumed: Sequence[Clause], wanted: Sequence[Clause], bounds: Bounds, certificates: list[Certificate]
 ) -> list[Answer]:
-    """Whether the node has what is wanted where something is assumed."""
+    """Whether the node satisfies the wanted clauses under the assumed ones."""
     if not wanted:
         return []
     system = System(bare_plan(node.name, ()), Contract((), (), (), (node,)))
@@ -332,20 +332,21 @@ def _required(
 
 
 def _of_inputs(clause: Clause, answer: Answer) -> Answer:
-    """An assumption of what the node itself has put out may hold of what it guarantees: no run without that refutes."""
+    """An assumption about the node's own outputs may follow from its guarantees: a run found without them does not
+    refute."""
     if answer.verdict is not Verdict.REFUTED or all(v.role is Role.INPUT for v in ports_of(clause.formula)):
         return answer
     return Answer(Verdict.UNKNOWN, "it speaks of what the node has put out, of which its guarantees were not used")
 
 
 def _placed(node: str, formula: Term) -> Term:
-    """A clause's formula over ``node.port``, as a requirement's is."""
+    """A clause's formula over ``node.port``, like a requirement's."""
     ports: Mapping[Variable, Variable] = {v: replace(v, name=f"{node}.{v.name}") for v in ports_of(formula)}
     return substitute(formula, ports)
 
 
 def _alone(composition: Composition, answer: Answer) -> Answer:
-    """A proof that rests on what the node guarantees and on what is assumed, and on nothing else."""
+    """The answer, proved only if the proof uses nothing but the node's guarantees and the assumptions."""
     if answer.verdict is not Verdict.PROVED:
         return answer
     assumed = {claim.digest for claim in composition.certificates.known.every if claim.kind is Claimed.ENVIRONMENT}

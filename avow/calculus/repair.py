@@ -1,11 +1,11 @@
-"""What would make it hold: where an entailment between contracts fails, a clause with which it would not.
+"""Repairs: if an entailment between contracts fails, a clause that would make it hold.
 
-The search looks for a further guarantee of a provider (in its own ports), a further assumption about the environment's
-inputs, and, at the first step, a condition on an initial value: each the weakest there is, by quantifier elimination
-where the formulas allow that (`avow.solving.quantifier_elimination`), or by trying all values where they are few.
-Otherwise a place that can speak of all that the goal speaks of gets the goal itself. Each offer is checked: with it the
-goal is proved, it does not contradict what else is known, and no guarantee is offered that its node could not keep. The
-search is bounded in steps, so a missing offer means nothing.
+The search looks for a further guarantee of a provider (over its own ports), a further assumption about the
+environment's inputs, and, at the first step, a condition on an initial value. Each is the weakest one, found by
+quantifier elimination if the formulas allow it (`avow.solving.quantifier_elimination`), or by trying all values if they
+are few. Otherwise a place whose ports cover all variables of the goal gets the goal itself. Each offer is checked: it
+makes the goal provable, it does not contradict the other hypotheses, and no guarantee is offered that its node could
+not keep. The search is bounded in steps, so a missing offer means nothing.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ from avow.system.plan import Endpoint
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """Where a clause might be added. `ports`: variables of the question → how the clause there calls them."""
+    """A place where a clause might be added. `ports`: variables of the query → their names in a clause there."""
 
     kind: str
     """``guarantee`` of a node, ``environment`` assumption, or ``initial`` value of ``node.port``."""
@@ -49,7 +49,7 @@ class Place:
 
 @dataclass(frozen=True, slots=True)
 class Offer:
-    """A clause with which the goal would hold."""
+    """A clause that would make the goal hold."""
 
     kind: str
     of: str
@@ -58,7 +58,7 @@ class Offer:
 
     @property
     def clause(self) -> str:
-        """As RCL; of an initial value the formula alone, as the plan has it."""
+        """The clause in RCL; for an initial value, the formula alone, as in the plan."""
         word = {"guarantee": "guarantee ", "environment": "assume "}.get(self.kind, "")
         shown = show_term(self.formula, "rcl")
         return f"{word}( {shown} )" if word else shown
@@ -76,13 +76,13 @@ class Offer:
                 return f"the first value of {self.of} met ( {shown} )"
 
     def data(self, when: str = "") -> dict[str, object]:
-        """For an outcome's details."""
+        """The offer as an entry of an outcome's details."""
         found: dict[str, object] = {"kind": self.kind, "of": self.of, "clause": self.clause, "weakest": self.weakest}
         return found | ({"when": when} if when else {})
 
 
 def offers(frame: Frame, hypotheses: Mapping[str, t.Term], goal: t.Term, places: Iterable[Place]) -> tuple[Offer, ...]:
-    """What would make the hypotheses imply the goal, at most one offer for each place."""
+    """Clauses that would make the hypotheses imply the goal, at most one offer for each place."""
     end = until(OFFERS_EFFORT)
     found: dict[tuple[str, str], Offer] = {}
     size = sum(1 for term in (goal, *hypotheses.values()) for _ in subterms(term))
@@ -100,7 +100,7 @@ def offers(frame: Frame, hypotheses: Mapping[str, t.Term], goal: t.Term, places:
 def _offer(frame: Frame, known: Mapping[str, t.Term], goal: t.Term, place: Place) -> Offer | None:
     found = _eliminated(known, goal, place)
     if found is None or not found[1]:
-        # What elimination cannot do, or only without some hypothesis, trying every value can, if they are few.
+        # If elimination fails, or succeeds only without some hypothesis, try every value, if they are few.
         tried = _enumerated(known, goal, tuple(place.ports), OFFER_STEP_EFFORT)
         found = tried if tried is not None and (tried[1] or found is None) else found
     if found is None:
@@ -112,8 +112,8 @@ def _offer(frame: Frame, known: Mapping[str, t.Term], goal: t.Term, place: Place
 
 
 def _eliminated(known: Mapping[str, t.Term], goal: t.Term, place: Place) -> tuple[t.Term, bool] | None:
-    """By quantifier elimination; else the goal itself, if the place can speak of all that it does. And whether it is
-    the weakest."""
+    """A condition found by quantifier elimination, otherwise the goal itself if the place's ports cover its variables;
+    and whether it is the weakest."""
     usable = {label: term for label, term in known.items() if eliminable(term)}
     assumption: t.Term | None = None
     weakest = False
@@ -136,7 +136,7 @@ def _is_whole(value: object) -> bool:
 
 
 def _tidy(term: t.Term) -> t.Term:
-    """``not x >= 1`` as ``x < 1``, and ``k > 2.0`` of an integer as ``k > 2``: elimination leaves the first."""
+    """Simplifies ``not x >= 1`` to ``x < 1`` and, for an integer, ``k > 2.0`` to ``k > 2``, as left by elimination."""
     match term:
         case t.Not(body=t.Compare(operator=operator, left=left, right=right)):
             return _tidy(t.Compare(OPPOSITE[operator], left, right))
@@ -150,7 +150,7 @@ def _tidy(term: t.Term) -> t.Term:
 
 
 def _may_be_kept(frame: Frame, name: str, further: t.Term) -> bool:
-    """False where, for some inputs that the node has to accept, no outputs meet its guarantees and the further one."""
+    """False if, for some inputs that the node has to accept, no outputs satisfy its guarantees and the further one."""
     node = frame.node(name)
     meets = conjunction([*(clause.formula for clause in node.guarantees), further])
     outputs = tuple(port.variable for port in node.outputs)
@@ -165,11 +165,11 @@ def _may_be_kept(frame: Frame, name: str, further: t.Term) -> bool:
 def _enumerated(
     known: Mapping[str, t.Term], goal: t.Term, ports: Sequence[t.Variable], effort: int
 ) -> tuple[t.Term, bool] | None:
-    """A condition on some of the ports with which the goal follows, and whether it is the weakest. None where there is
-    none, or where they have too many values."""
+    """A condition on some of the ports that makes the goal follow, and whether it is the weakest. None if there is
+    none, or the ports have too many values."""
     spoken = free_variables(goal).union(*map(free_variables, known.values()))
     finite = [(v, values) for v in ports if v in spoken and (values := finite_values(v.sort))]
-    # A relation's values are as finite as its points, and a question each: only what can be written as a set is tried.
+    # Relations have finitely many values, but each costs a query: only values that can be written as a set are tried.
     if not finite or math.prod(len(values) for _, values in finite) > VALUES_TRIED:
         return None
     good: list[tuple[t.Term, ...]] = []
@@ -215,7 +215,7 @@ def providers(frame: Frame, nodes: Iterable[str], earlier: int = 0) -> Iterator[
 
 
 def environment(frame: Frame, nodes: Iterable[str], earlier: int = 0) -> Iterator[Place]:
-    """The inputs of some nodes that nothing provides: each alone, as the plan would have it; then a node's together."""
+    """The environment inputs of some nodes: each alone, as a plan's entry; then all of one node together."""
     nodes = tuple(nodes)
     ports: dict[t.Variable, tuple[str, t.Variable]] = {}
     for name in nodes:
@@ -230,7 +230,7 @@ def environment(frame: Frame, nodes: Iterable[str], earlier: int = 0) -> Iterato
 
 
 def _together(frame: Frame, name: str, earlier: int) -> Iterator[Place]:
-    """All environment inputs of one node, under the entry that the plan reads as that node's."""
+    """All environment inputs of one node, under the plan's entry that is read as that node's."""
     outside = [endpoint for endpoint in frame.graph.environment if endpoint.node == name]
     for endpoint in outside if len(outside) > 1 else ():
         entry = frame.entry(name, endpoint.port)
@@ -242,7 +242,7 @@ def _together(frame: Frame, name: str, earlier: int) -> Iterator[Place]:
 
 
 def initial_values(frame: Frame, consumer: str) -> Iterator[Place]:
-    """What comes first over the delayed edges that feed a node."""
+    """The initial values on the delayed edges that feed a node."""
     for edge in frame.graph.feeding(consumer):
         if edge.delayed:
             source = edge.source
@@ -252,8 +252,7 @@ def initial_values(frame: Frame, consumer: str) -> Iterator[Place]:
 
 
 def _called(frame: Frame, name: str, earlier: int) -> dict[t.Variable, t.Variable]:
-    """System-level variables as the node's own ports. Of two inputs that read one value, one is enough; what its
-    clauses remember is no port."""
+    """System-level variables as the node's own ports, without cells. If two inputs read one value, one is enough."""
     found: dict[t.Variable, t.Variable] = {}
     for variable, meant in frame.mapping(name, earlier).items():
         if isinstance(meant, t.Variable) and CELL not in variable.name:

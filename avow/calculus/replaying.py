@@ -1,7 +1,7 @@
-"""A run that refutes, replayed: apart from the search that found it, from the contracts and the plan alone.
+"""Replays a refuting run, independently of the search that found it, from the contracts and the plan alone.
 
-Each clause, each wire and each initial value is looked at anew, in the values that the run shows; then the property is
-evaluated on it by its definition. What cannot be evaluated exactly is put to the solver, which then has to prove it.
+Each clause, each wire and each initial value is checked again in the values that the run shows; then the property is
+evaluated on it by its definition. Formulas that cannot be evaluated exactly go to the solver, which has to prove them.
 """
 
 from __future__ import annotations
@@ -30,8 +30,8 @@ Truth = Mapping[State, bool]
 
 
 def completions(machine: Machine, steps: Sequence[Step]) -> Iterator[tuple[Step, ...]]:
-    """The run as it was found, and with what was left open in it decided: each function, and each sequence, the same in
-    all its open places."""
+    """The run as found, and versions with its open values decided: each function and each sequence gets one value for
+    all its open points."""
     yield tuple(steps)
     if any(is_open(value) for step in steps for value in step.values.values()):
         for choice in range(COMPLETIONS):
@@ -50,8 +50,8 @@ def _completed(machine: Machine, values: Mapping[str, Value], choice: int) -> di
 
 
 def unsupported(machine: Machine, steps: Sequence[Step], back: int | None) -> Iterator[str]:
-    """What of a run is not shown to be as the contracts and the plan have it; nothing where all is. `back`: the step
-    to which the last one returns; None for a run that is not said to go on, or to stay as it is for ever."""
+    """The parts of a run that are not shown to agree with the contracts and the plan. `back`: the step to which the
+    last one returns; None for a run that does not continue, or stays as it is for ever."""
     for number, step in enumerate(steps, start=1):
         at = f" at step {number}"
         for label, term in machine.frame.environment().items():
@@ -72,7 +72,7 @@ def _moves(steps: Sequence[Step], back: int | None) -> Iterator[tuple[Step, Step
 
 
 def _wires(machine: Machine, before: Mapping[str, Value], after: Mapping[str, Value]) -> Iterator[str]:
-    """Values that delayed edges, and constants of the environment, do not carry from one step to the next."""
+    """Cells, delayed edges and environment constants whose values do not carry over from one step to the next."""
     for name, cell in machine.cells.items():
         try:
             left = cell.now(before)
@@ -111,7 +111,7 @@ def _start(machine: Machine, values: Mapping[str, Value]) -> Iterator[str]:
 
 
 def _node(machine: Machine, name: str, values: Mapping[str, Value]) -> Iterator[str]:
-    """The guarantees of a node that are not shown to hold; none where an assumption is shown not to."""
+    """The guarantees of a node that are not shown to hold; none if an assumption is shown not to hold."""
     node = machine.frame.node(name)
     found = {own: values[meant] for own, meant in machine.reads[name]}
     found |= {f"out.{port.name}": values[f"{name}.{port.name}"] for port in node.outputs}
@@ -127,7 +127,7 @@ def _node(machine: Machine, name: str, values: Mapping[str, Value]) -> Iterator[
 
 
 def _truth(machine: Machine, formula: Term, values: Mapping[str, Value]) -> bool | None:
-    """Whether a formula holds of values: evaluated exactly, or proved of them. None: neither is known."""
+    """Whether a formula holds for values, by exact evaluation or by proof; None if undecided."""
     doubts = Doubts()
     try:
         found = judge(machine.world, formula, doubts=doubts)(values)
@@ -146,14 +146,14 @@ def _truth(machine: Machine, formula: Term, values: Mapping[str, Value]) -> bool
 
 
 def truths(machine: Machine, formula: Property, step: Step) -> Truth | None:
-    """The state formulas of a property at a step, exactly; None where some is not known."""
+    """The exact truth of a property's state formulas at a step; None if some is not known."""
     found = {s: _truth(machine, system_term(machine.frame, s.term), step.values) for s in states_of(formula)}
     known = {state: truth for state, truth in found.items() if truth is not None}
     return known if len(known) == len(found) else None
 
 
 def holds(formula: Property, run: Sequence[Truth], back: int) -> bool:
-    """Whether a property holds at the first step of a run that goes on with step `back` after its last: by the
+    """Whether a property holds at the first step of a run that continues with step `back` after its last: by the
     definition of linear temporal logic, from the inner formulas outwards."""
     return _everywhere(formula, run, back)[0]
 
@@ -187,7 +187,7 @@ def _everywhere(formula: Property, run: Sequence[Truth], back: int) -> list[bool
 
 
 def _until(left: Sequence[bool], right: Sequence[bool], following: Sequence[int]) -> list[bool]:
-    """The least solution: twice round, backwards, settles what comes through the loop."""
+    """The least fixed point: two backward passes suffice for one loop."""
     found = list(right)
     for _ in range(2):
         for k in reversed(range(len(found))):

@@ -1,15 +1,15 @@
-"""Requirements that have a formula: does it follow from what is derived? Those with a temporal property: does every
-run of the composed contracts have it?
+"""Requirements with a formula: does it follow from the contracts? Requirements with a temporal property: does it hold
+on every run of the composed contracts?
 
-A formula is proved of every step: from the guarantees that the plan names as its support where these suffice, from all
-contracts otherwise; or by induction over steps, from the initial values on.
+A formula is proved for every step: from the guarantees that the plan names as its support if these suffice, from all
+contracts otherwise; or by induction over steps, starting from the initial values.
 
-A formula that holds whatever the nodes do, or only because its condition never comes about, is satisfied by every
-design, and a proof of it shows nothing. So a formula that the contracts imply is asked what the sanity analysis asks of
-a guarantee: is it a tautology, or does it follow from the plan's assumptions alone; can each of its conditions come
-about (`avow.sanity.claims.triggers`); do the contracts exclude any of its mutants (`avow.sanity.mutants`)? These
-questions are about one step, which need not be reached, so "nothing" is only said where it is proved. A temporal
-property is asked the same over the runs of the plan's scenario.
+A formula that holds whatever the nodes do, or only because its condition never arises, is satisfied by every design,
+and a proof of it shows nothing. So a formula that the contracts imply gets the checks that the sanity analysis makes
+for a guarantee: is it a tautology, or does it follow from the plan's assumptions alone; can each of its conditions
+arise (`avow.sanity.claims.triggers`); do the contracts exclude any of its mutants (`avow.sanity.mutants`)? These checks
+are about one step, which need not be reachable, so vacuity is only reported if it is proved. A temporal property is
+checked the same way over the runs of the plan's scenario.
 """
 
 from __future__ import annotations
@@ -59,13 +59,14 @@ class FormulaQuestion:
     digest: str
     support: tuple[str, ...]
     unsaid: str = ""
-    """Why there is no formula of one step, where it speaks of others."""
+    """Why there is no formula over one step, for a formula that mentions other steps."""
     required: bool = False
-    """The formula is a requirement's, which has to say something; a demand of a refinement may follow from anything."""
+    """Whether the formula is a requirement's, which must not be vacuous; a demand of a refinement may follow from
+    anything."""
 
     def __call__(self, composition: Composition, bounds: Bounds) -> Answer:
-        """In short rounds first: what one way cannot show, at any length, another may in no time. A run over the plan's
-        scenario that breaks the formula is looked for before anything takes long."""
+        """Tries each method briefly first: one may be quick where another never succeeds. A run over the plan's
+        scenario that violates the formula is searched for before any long attempt."""
         if self.unsaid:
             told = f"{self.unsaid}: nothing can be shown of it step by step; a `temporal` property is judged over runs"
             return Answer(Verdict.UNKNOWN, told)
@@ -81,8 +82,7 @@ class FormulaQuestion:
         return _says_nothing(answer, why or self.unused_support(frame, answer, assumed))
 
     def unused_support(self, frame: Frame, answer: Answer, assumed: Mapping[str, Term]) -> str:
-        """Why the proof of a formula uses no guarantee, or none that the plan names as its support; else an empty
-        text."""
+        """Why the proof of a formula uses no guarantee, or none that the plan names as its support; otherwise empty."""
         listed = answer.details.get("needed")
         labels = tuple(map(str, listed)) if isinstance(listed, list) else ()
         used = _guarantees(frame, labels)
@@ -95,7 +95,7 @@ class FormulaQuestion:
         return ""
 
     def searched(self, composition: Composition, bounds: Bounds) -> Answer:
-        """The answer, of the clauses that have formulas of one step."""
+        """The answer from the clauses that have formulas over one step."""
         quick = min(QUICK_EFFORT, bounds.effort)
         answer = self.attempt(composition, replace(bounds, effort=quick))
         if answer.verdict is not Verdict.UNKNOWN:
@@ -111,8 +111,8 @@ class FormulaQuestion:
         return replace(answer, summary=f"{answer.summary}; {searched}")
 
     def broken_by_a_run(self, composition: Composition, bounds: Bounds) -> tuple[Answer | None, str]:
-        """A run of the composed contracts over the plan's scenario, at one of whose steps the formula is false; else
-        how far it was looked for."""
+        """A run of the composed contracts over the plan's scenario with a step at which the formula is false; otherwise
+        how far the search went."""
         if composition.frame.system.plan.scenario is None:
             return None, ""
         always = Temporal(Operator.ALWAYS, (State(self.formula),))
@@ -125,8 +125,8 @@ class FormulaQuestion:
         return None, f"no run of the {found.bound['steps']} kinds of steps looked at over the scenario makes it false"
 
     def attempt(self, composition: Composition, bounds: Bounds, *, patient: bool = False) -> Answer:
-        """One round. The `patient` one, after a quick one, asks only the widest question of each kind: what nothing
-        settles costs a few times the limit, and no more."""
+        """One round. The `patient` one, after a quick one, makes only the widest query of each kind, so that an
+        undecided formula costs only a few times the limit."""
         frame = composition.frame
         everything = _every_guarantee(frame)
         goal = system_term(frame, self.formula)
@@ -146,7 +146,8 @@ class FormulaQuestion:
     def repaired(
         self, frame: Frame, goal: Term, answer: Answer, further: Mapping[str, Term] | None = None, when: str = ""
     ) -> Answer:
-        """A refutation, or a step at which induction fails, with what would make it hold; another answer as it is."""
+        """A refutation, or a step at which induction fails, with clauses that would make the formula hold; other
+        answers unchanged."""
         if not self.required or (answer.verdict is not Verdict.REFUTED and "induction" not in answer.details):
             return answer
         nodes = frame.graph.nodes
@@ -181,7 +182,7 @@ class FormulaQuestion:
         itself = {f"{self.name} one step before": system_term(frame, self.formula, 1)}
         before = self.known(frame, everything, 1)
         later = first
-        # Mostly it keeps itself; and the contracts of a step less make it quick.
+        # Usually the formula alone is inductive; without the contracts one step before, the query is quick.
         for earlier in (itself | before,) if patient else (itself, itself | before):
             later = self.ask(now | earlier, goal, bounds)
             if later.verdict is Verdict.PROVED:
@@ -202,7 +203,7 @@ class FormulaQuestion:
         return self.repaired(frame, goal, self.induction_fails(later), itself | before, Phase.LATER.value)
 
     def induction_fails(self, answer: Entailment) -> Answer:
-        """There is a step that does not keep the formula; whether it is ever reached is not known."""
+        """The answer if some step does not preserve the formula and it is unknown whether that step is ever reached."""
         values = answer.counterexample.values if answer.counterexample is not None else ()
         told = f"here induction fails, {self.name} is false, if such a step is reached (@before: one step before)"
         shown = Counterexample(values, told)
@@ -216,8 +217,8 @@ class FormulaQuestion:
         )
 
     def known(self, frame: Frame, clauses: tuple[str, ...], earlier: int = 0) -> dict[str, Term]:
-        """What may be used of a step: these guarantees, all assumptions of their nodes, what is assumed of the
-        environment, and what is remembered."""
+        """The hypotheses about a step: these guarantees, all assumptions of their nodes, the environment assumptions,
+        and the definitions of cells."""
         found: dict[str, Term] = {}
         for node, _, clause in (name.partition(".") for name in clauses):
             for name in (*(assumption.name for assumption in frame.node(node).assumptions), clause):
@@ -236,7 +237,7 @@ class FormulaQuestion:
         before: int = 1,
         by: tuple[Written, ...] = (),
     ) -> Answer:
-        """`before`: so many steps before were needed to prove the next; `by`: invariants that nobody wrote down."""
+        """`before`: the number of earlier steps needed to prove the next; `by`: invariants that were found."""
         needed = tuple(dict.fromkeys(label for answer in answers for label in answer.needed))
         beyond = [n for n in _guarantees(composition.frame, needed) if n not in self.support and self.support]
         how = "at the first step, and from one step to the next" if phase is Phase.LATER else "at every step"
@@ -252,7 +253,7 @@ class FormulaQuestion:
         found = composition.certificates.requirement(self.name, hint, bounds, by)
         fallen = composition.fallen(composition.whole) if found is None else ()
         shown = [in_words(composition.frame, one) for one in by]
-        if shown and not fallen:  # else it was found with what may not be used
+        if shown and not fallen:  # otherwise it was found with hypotheses that may not be used
             details["invariants"] = shown
             summary += f"; by an invariant that was found: {' and '.join(shown)}"
         answer = Answer(
@@ -273,7 +274,7 @@ class FormulaQuestion:
 
 @dataclass(frozen=True, slots=True)
 class TemporalQuestion:
-    """Has every run the property?"""
+    """Does every run have the property?"""
 
     name: str
     formula: Property
@@ -294,19 +295,19 @@ class TemporalQuestion:
 
         frame, assumed = composition.frame, composition.assumed()
         answer = _says_nothing(answer, _property_says_nothing(frame, self.formula, holds, assumed, bounds))
-        # every node was taken at its word, which it keeps only where its assumptions are met
+        # every node's guarantees were used, which hold only if its assumptions are met
         return replace(answer, everything=True)
 
 
 def _says_nothing(answer: Answer, why: str) -> Answer:
-    """An answer that shows nothing, where there is a reason why."""
+    """The answer, marked vacuous if a reason `why` is given."""
     return replace(answer, vacuous=True, summary=f"says nothing: {why}") if why else answer
 
 
 def requirement_question(
     composition: Composition, requirement: Requirement
 ) -> FormulaQuestion | TemporalQuestion | None:
-    """The question behind a requirement; None where it is prose. Raises Rejected for a formula that is wrong."""
+    """The question for a requirement; None if it is prose. Raises Rejected if a formula is wrong."""
     frame = composition.frame
     if requirement.formula is not None:
         return replace(formula_question(frame, requirement.id, supports(composition, requirement)), required=True)
@@ -334,7 +335,7 @@ def supports(composition: Composition, requirement: Requirement) -> tuple[str, .
 
 
 def formula_question(frame: Frame, name: str, support: tuple[str, ...]) -> FormulaQuestion:
-    """The question behind a formula that is required; `support`: guarantees from which it should follow."""
+    """The question for a required formula; `support`: guarantees from which it should follow."""
     term = frame.required[name]
     known = frame.observed.get(name, Observed(term))
     text = show_term(system_term(frame, term))
@@ -361,8 +362,8 @@ def _meaning(formula: Property) -> str:
 def _formula_says_nothing(
     frame: Frame, formula: Term, known: Mapping[str, Term], assumed: Mapping[str, Term], bounds: Bounds
 ) -> str:
-    """Why a formula that `known` implies says nothing, else an empty text. `formula` is written over ``node.port``;
-    `assumed` are those hypotheses that no guarantee gives."""
+    """Why a formula that `known` implies is vacuous; otherwise empty. `formula` is over ``node.port``; `assumed` are
+    the hypotheses that are not guarantees."""
     effort = min(CONSISTENT_EFFORT, bounds.effort)
 
     def proves(hypotheses: Mapping[str, Term], goal: Term) -> tuple[str, ...] | None:
@@ -388,7 +389,7 @@ def _formula_says_nothing(
 def _property_says_nothing(
     frame: Frame, formula: Property, holds: Callable[[Property], bool], assumed: Mapping[str, Term], bounds: Bounds
 ) -> str:
-    """Why a temporal property that every run has says nothing, else an empty text. `holds`: whether every run has
+    """Why a temporal property that every run has is vacuous; otherwise empty. `holds` tells whether every run has
     another property."""
     if _tautological(frame, formula, assumed, bounds):
         return "the property holds of every run, whatever the nodes do"
@@ -402,7 +403,7 @@ def _property_says_nothing(
 
 
 def _tautological(frame: Frame, formula: Property, assumed: Mapping[str, Term], bounds: Bounds) -> bool:
-    """Whether no sequence of steps, each of which the assumptions allow, breaks the property."""
+    """Whether no sequence of steps that the assumptions allow violates the property."""
     states = states_of(formula)
     if len(states) > PROPERTY_ATOMS:
         return False
@@ -429,7 +430,7 @@ def _possible(
 
 def _without_demand(formula: Property) -> Iterator[tuple[str, Property]]:
     """For each condition under which the property demands something: the condition, and the property that it never
-    comes about."""
+    arises."""
     match formula:
         case State(term=term):
             for trigger in triggers(term):

@@ -1,11 +1,11 @@
 """Finds the rule instances of a selection of nodes (or of the whole system) in the graph and nests them. Pure.
 
-Strongly connected components are loops (R4); between them the graph has no circle and is walked from providers to
-consumers: one provider makes a sequence (R1), several make a union (R3), one provider of several consumers that have
-no other makes a branching (R2). Shared parts are shared in the tree, so that its size stays that of the graph.
+Strongly connected components are loops (R4). Between them the graph is acyclic and is walked from providers to
+consumers: one provider makes a sequence (R1), several make a union (R3), and a sole provider of several consumers makes
+a branching (R2). Shared parts are shared in the tree, so that it is no larger than the graph.
 
-All four are one instance of the theorem, `Nodes` in proofs/instances.dfy: nodes in causal order (R1 to R3), a loop's
-also from the step before (R4). Persistence and one output are `Latched` there: what makes a wire an equation.
+All four are one instance of the theorem, `Nodes` in proofs/instances.dfy: nodes in causal order (R1 to R3), for a loop
+also from the step before (R4). Persistence and one output are `Latched` there: they make a wire an equation.
 """
 
 from __future__ import annotations
@@ -31,10 +31,10 @@ ONE_OUTPUT = "{} give at most one output element for each input element"
 
 
 def derive(frame: Frame, goal: ComposeGoal | None = None, *, carry: bool = False, name: str = WHOLE) -> Goal:
-    """The derivation that a goal of the plan asks for; without one, that of the whole system.
+    """The derivation for a goal of the plan; without a goal, the derivation of the whole system.
 
-    `carry`: an assumption that speaks of anything from outside the selection stays assumed in the conclusion, for a
-    larger derivation to show; otherwise one that speaks of something from inside as well is to be shown here.
+    `carry`: an assumption that mentions anything from outside the selection stays assumed in the conclusion, for a
+    larger derivation to show; otherwise one that also mentions something from inside has to be shown here.
     """
     names = goal.select if goal is not None and goal.select else frame.graph.nodes
     builder = _Builder(frame, tuple(names), carry)
@@ -80,7 +80,7 @@ class _Builder:
         return tuple(dict.fromkeys(e.source.node for e in self.edges_into(node) if e.source.node != node))
 
     def outside(self, node: str, providers: Iterable[str]) -> tuple[str, ...]:
-        """Inputs of a node that the providers do not give, each with where it comes from."""
+        """Inputs of a node that the providers do not feed, each with its source."""
         given = frozenset(providers)
         found: list[str] = []
         of = self.frame.system.contract if node in self.frame.cells else self.frame
@@ -96,7 +96,7 @@ class _Builder:
         self, node: str, providers: Sequence[str]
     ) -> tuple[tuple[SideCondition, ...], tuple[ClauseName, ...]]:
         """The side conditions of a consumer, and those of its assumptions that stay assumed in the conclusion."""
-        given = frozenset(providers) | self.selected  # whatever the rule's shape: nothing that feeds it is left out
+        given = frozenset(providers) | self.selected  # for every rule: all nodes that feed it
         conditions: list[SideCondition] = []
         kept: list[ClauseName] = []
         for clause in self.frame.node(node).assumptions:
@@ -114,8 +114,8 @@ class _Builder:
         return tuple(conditions), tuple(kept)
 
     def sources(self, node: str, clause: Clause) -> list[tuple[str, Edge | None]]:
-        """The inputs that a clause speaks of, and the edge that feeds each (None: the environment). What it remembers
-        of one comes over an edge with a delay, also what it remembers of the node's own outputs."""
+        """The inputs that a clause mentions, and the edge that feeds each (None: the environment). Earlier values come
+        over a delayed edge, including earlier values of the node's own outputs."""
         found: list[tuple[str, Edge | None]] = []
         for port, remembered in self.frame.behind(node, clause.formula):
             at = Endpoint(node, port.name)
@@ -138,7 +138,7 @@ class _Builder:
         return Derivation(Rule.PREMISE, (node,), assumed=assumed, guaranteed=(node,))
 
     def rooted(self, node: str) -> Derivation:
-        """A node that no selected node feeds: what the plan's environment gives of its assumptions is shown."""
+        """A node that no selected node feeds: assumptions that follow from the plan's environment are shown."""
         conditions, kept = self.conditions(node, ())
         return Derivation(
             Rule.PREMISE,
@@ -159,7 +159,7 @@ class _Builder:
         hypotheses: tuple[str, ...] = (),
         entries: Sequence[str] = (),
     ) -> Derivation:
-        """A rule by which the consumers, each fed by the givers, are added to what was derived before."""
+        """A rule instance that adds the consumers, each fed by the givers, to the earlier derivations."""
         parts = [self.conditions(node, givers) for node in consumers]
         return Derivation(
             rule,
@@ -175,7 +175,7 @@ class _Builder:
         )
 
     def sequence(self, before: Derivation, provider: str, node: str) -> Derivation:
-        """R1: one node more at the end of a sequence, or a sequence of two."""
+        """R1: one more node at the end of a sequence, or a sequence of two."""
         found = self.instance(Rule.R1, (provider, node), (before,), (node,), (provider,))
         if before.rule is not Rule.R1 or before.nodes[-1] != provider:
             return found
@@ -203,7 +203,7 @@ class _Builder:
     # -- as the plan asks ----------------------------------------------------------------------------------------------
 
     def as_asked(self, rule: Rule) -> Derivation | None:
-        """One instance of the rule over all selected nodes, or None where it does not fit."""
+        """One instance of the rule over all selected nodes, or None if it does not fit."""
         if len(self.nodes) < 2 and rule is not Rule.R4:
             return None
         match rule:
@@ -223,13 +223,13 @@ class _Builder:
                         return self.branching(self.premise(root), root, leaves)
                 return None
             case Rule.R3:
-                # The last one named is the paper's node n; where it does not fit, any that does.
+                # The last one named is the paper's node n; if it does not fit, any node that does.
                 for sink in reversed(self.nodes):
                     sources = [node for node in self.nodes if node != sink]
                     if all(source in self.providers(sink) for source in sources):
                         return self.union([self.premise(source) for source in sources], sources, sink)
                 return None
-            case Rule.R4 | Rule.PREMISE | Rule.ALL:  # R4: a plan names no other
+            case Rule.R4 | Rule.PREMISE | Rule.ALL:  # a plan can only name R4 of these
                 whole = self.found()
                 return whole if any(part.rule is Rule.R4 for part in whole.walk()) else None
             case _:
@@ -244,7 +244,7 @@ class _Builder:
         made: dict[str, Derivation] = {}
         for group in groups:
             if group[0] in made:
-                continue  # a leaf of a branching made before
+                continue  # a leaf of an earlier branching
             entries = tuple(dict.fromkeys(p for node in group for p in self.providers(node) if home[p] != group))
             before = _distinct(made[entry] for entry in entries)
             if len(group) > 1 or self.depends_on_itself(group[0]):
@@ -275,7 +275,7 @@ class _Builder:
         )
 
     def leaves(self, root: str, home: dict[str, tuple[str, ...]]) -> tuple[str, ...]:
-        """The nodes that have no other provider than `root`, and are not in loops."""
+        """The nodes whose only provider is `root` and that are not in loops."""
         return tuple(
             node
             for node in self.frame.graph.consumers(root)
@@ -287,7 +287,7 @@ class _Builder:
         )
 
     def depends_on_itself(self, node: str) -> bool:
-        """Whether an assumption of the node speaks of an input that it feeds itself."""
+        """Whether an assumption of the node mentions an input that the node itself feeds."""
         return any(
             edge is not None and edge.source.node == node
             for clause in self.frame.node(node).assumptions
@@ -304,7 +304,7 @@ def _union(parts: Iterable[tuple[ClauseName, ...]]) -> tuple[ClauseName, ...]:
 
 
 def _distinct(parts: Iterable[Derivation]) -> list[Derivation]:
-    """Each derivation once, by identity: shared parts are shared, and comparing them would walk them."""
+    """Each derivation once, by identity: comparing shared parts by value would walk them."""
     seen: dict[int, Derivation] = {}
     for part in parts:
         seen.setdefault(id(part), part)

@@ -1,6 +1,6 @@
-"""A plan's finite scenario as values: what the environment may give, and what outputs may be, in a bounded check.
+"""A plan's finite scenario as values: the possible environment inputs and outputs in a bounded check.
 
-The scenario restricts which values are *tried*; whether a guarantee holds of them is judged exactly.
+The scenario restricts which values are *tried*; whether a guarantee holds for them is judged exactly.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ Point = tuple[Value, ...]
 
 
 class CannotRun(Exception):  # noqa: N818 - it names a state
-    """The composed contracts cannot be run over this scenario; says why, and what would help."""
+    """The composed contracts cannot be run over this scenario; the message says why, and what would help."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,7 +42,7 @@ class World:
     scenario: Scenario
     domains: dict[s.Sort, tuple[Value, ...]]
     effort: int = 10_000
-    """For one question to the solver."""
+    """The effort limit of one solver query."""
 
     def choices(self, node: str, port: Port) -> tuple[Value, ...]:
         """The values that an environment input may take at each step. Raises CannotRun."""
@@ -52,8 +52,8 @@ class World:
         return self.values(f"{node}.{port.name}", ("in", node), port)
 
     def lengths(self) -> tuple[Fraction, ...]:
-        """How long steps may take, in seconds: those of ``scenario.domains.dt`` or, without, the nodes' own, and half
-        of them. Raises CannotRun."""
+        """The possible times between steps, in seconds: those of ``scenario.domains.dt`` or, without it, the nodes' own
+        and half of these. Raises CannotRun."""
         paces = [pace for node in self.frame.system.contract.nodes if (pace := pace_of(node)) is not None]
         limits = [(p.relation, Fraction(p.amount.value)) for p in paces if isinstance(p.amount, Literal)]
         texts = self.scenario.domains.get(STEP_LENGTH)
@@ -75,7 +75,7 @@ class World:
         return self.values(f"{node}.{port.name}", ("out", node), port)
 
     def domain(self, owners: Sequence[str], port: Port) -> tuple[str, ...] | None:
-        """What the scenario says of a port by its name."""
+        """The scenario's values for a port, by its name."""
         found = (self.scenario.domains.get(f"{owner}.{port.name}") for owner in owners)
         return next((texts for texts in found if texts is not None), None)
 
@@ -111,8 +111,8 @@ class World:
         return found_points
 
     def tuples(self, sorts: Sequence[s.Sort]) -> tuple[Point, ...] | None:
-        """The combinations of values that are tried: of the given ranges if every sort has one, else the places that
-        the interpreted tables speak of (a relation on REAL x REAL x NATURAL speaks of pairs of reals)."""
+        """The combinations of values that are tried: from the given ranges if every sort has one, otherwise the points
+        that the interpreted tables contain (a relation on REAL x REAL x NATURAL contains pairs of reals)."""
         if all(finite_values(sort, self.domains) is not None for sort in sorts):
             return combinations(sorts, self.domains, VALUES_OF_A_PORT)
         found: dict[Point, None] = {}
@@ -140,7 +140,7 @@ class World:
             )
 
     def plain_values(self, sort: s.Sort) -> tuple[Value, ...] | None:
-        """The values of a sort that are tried; None where they are not finitely many."""
+        """The values of a sort that are tried; None if they are not finitely many."""
         if isinstance(sort, s.DataSort) and sort not in self.domains:
             found: list[Value] = []
             for constructor in sort.constructors:
@@ -180,7 +180,7 @@ class World:
         return FunctionValue(dict(zip(keys, results, strict=True)), self.elsewhere(sort.result, results))
 
     def elsewhere(self, sort: s.Sort, results: Sequence[Value]) -> Value:
-        """A function's value beside its table: one that the table does not give, and that does not follow on it."""
+        """A function's value outside its table: a value that is not in the table and not next to one in it."""
         if isinstance(sort, s.NaturalSort | s.IntegerSort | s.RealSort):
             numbers = [value for value in results if isinstance(value, int | Fraction)]
             top = max(numbers, default=0)
@@ -192,7 +192,7 @@ class World:
         return (unused or list(known))[0]
 
     def parse(self, text: str, sort: s.Sort) -> Value:
-        """A cell or a value as RCL writes it. Raises CannotRun."""
+        """Parses a table cell or a value in RCL notation. Raises CannotRun."""
         from avow.language.load import parse_term
 
         if isinstance(sort, s.StringSort) and not text.startswith('"'):
@@ -216,7 +216,7 @@ class World:
 
 
 def world(frame: Frame) -> World:
-    """The scenario of a system. Raises CannotRun where there is none, or its values cannot be read."""
+    """The scenario of a system. Raises CannotRun if there is none, or its values cannot be read."""
     scenario = frame.system.plan.scenario or Scenario()
     found = World(frame, scenario, {})
     named = {**s.BUILTINS, **dict(frame.system.contract.types)}
@@ -248,8 +248,8 @@ def ranges(whole: Frame, node: Node) -> Ranges:
 
 
 def restrictions(world: World) -> tuple[Hypothesis, ...]:
-    """What a bounded check supposes of the values that the contracts leave open, by its name in the plan: a range that
-    leaves out values of its sort, a relation or function that is a table's, and the sorts of which it tries some."""
+    """What a bounded check assumes about the values that the contracts leave open, by its name in the plan: a range
+    that leaves out values of its sort, a relation or function given by a table, and the sorts that are sampled."""
     scenario, found = world.scenario, list[Hypothesis]()
     named = {**s.BUILTINS, **dict(world.frame.system.contract.types)}
     for name, texts in scenario.domains.items():
@@ -275,7 +275,7 @@ def restrictions(world: World) -> tuple[Hypothesis, ...]:
 
 
 def _is_sampled(sort: s.Sort) -> bool:
-    """Whether not all of a sort's values are tried, though no range for it is written down."""
+    """Whether only some of a sort's values are tried, although no range for it is given."""
     if isinstance(sort, s.FunctionSort):
         return any(finite_values(part) is None for part in (*sort.parameters, sort.result))
     return finite_values(sort) is None
@@ -285,12 +285,12 @@ _KEYS: dict[int, tuple[FunctionValue, object]] = {}
 
 
 def key(value: Value) -> object:
-    """Equal for equal values, and quick to look up (functions hash poorly)."""
+    """A key that is equal for equal values and quick to look up (functions hash poorly)."""
     if not isinstance(value, FunctionValue):
         return value
     if len(value.table) <= SMALL_TABLE:
         return _function_key(value)
-    # Maps and plans are met again and again, and stay the same objects: a key is made once.
+    # Maps and plans occur many times as the same objects: their keys are computed once.
     known = _KEYS.get(id(value))
     if known is None or known[0] is not value:
         if len(_KEYS) > 10_000:

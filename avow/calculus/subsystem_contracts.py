@@ -1,14 +1,14 @@
-"""Subsystems as nodes of the calculus: their contracts are derived, and larger derivations use them as any node's.
+"""Subsystems as nodes of the calculus: their contracts are derived, and larger derivations use them like any node's.
 
-A clause of a subsystem is one of a node inside, about the same variables, so that nothing is lost or renamed. It
-guarantees all that its nodes guarantee, and assumes what its own derivation leaves assumed: what its nodes assume of
-values from outside it. Where such an assumption speaks of values from inside too, what the nodes behind these guarantee
-at that step may be used; it is carried outward as "if they do so, then".
+A clause of a subsystem is a clause of a node inside, over the same variables, so that nothing is lost or renamed. The
+subsystem guarantees everything that its nodes guarantee, and assumes what its own derivation leaves assumed: what its
+nodes assume about values from outside. If such an assumption also mentions values from inside, the guarantees of the
+nodes that produce them may be used at that step; it is carried outward as an implication from them.
 
-Why that is sound: outside, a subsystem's assumptions are shown at a step before its guarantees are used there (a loop
-that only closes outside is a loop of the larger derivation, and circular support in it is refused). Inside, its own
-derivation shows from them, step by step, every assumption that is not carried; then all its nodes' guarantees hold. It
-is `Derived` in proofs/instances.dfy; the kernel's certificates are of the nodes inside, without subsystems.
+This is sound: outside, a subsystem's assumptions are shown at a step before its guarantees are used there (a loop that
+only closes outside is a loop of the larger derivation, and circular support in it is refused). Inside, its own
+derivation shows from them, step by step, every assumption that is not carried; then all its nodes' guarantees hold. The
+theorem is `Derived` in proofs/instances.dfy; the kernel's certificates are about the nodes inside, without subsystems.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ class Level(Frame):
         return self.flat.remembering(self.leaves(nodes))
 
     def behind(self, node: str, formula: Term) -> tuple[tuple[Variable, bool], ...]:
-        """What a node inside remembers is of ports of the subsystem, as it is seen from outside."""
+        """A cell of a node inside remembers values of the subsystem's ports, as seen from outside."""
         face = self.faces.get(node)
         if face is None:
             return Frame.behind(self, node, formula)
@@ -90,7 +90,7 @@ class Level(Frame):
         return tuple(name for name in self.flat.graph.nodes if name in wanted)
 
     def meant(self, node: str, port: str) -> Endpoint:
-        """The port of a node inside that a subsystem's port stands for, or what that node remembers."""
+        """The port of a node inside that a subsystem's port stands for, or that node's cell."""
         face = self.faces.get(node)
         if face is not None and CELL in port:
             return Endpoint(*port.split(".", 1))
@@ -120,13 +120,13 @@ def level(flat: Frame, folded: Folded, composed: Mapping[str, Node]) -> Frame:
 
 
 Said = dict[ClauseName, Term]
-"""The clauses of subsystems over the whole system's values, as the nodes inside say them: with `previous` and the like,
-where the calculus has cells."""
+"""The clauses of subsystems over the whole system's values, as written in the nodes inside: with `previous` and the
+like, for which the calculus uses cells."""
 
 
 def composed_node(frame: Frame, goal: Goal, face: Face, said: Said) -> tuple[Node, tuple[str, ...]]:
-    """The subsystem with its derived contract, and that in lines of text. Clauses are called ``camera.sharp``, as the
-    node inside calls them; and it reads what they remember (``camera.once#…``). What they say is added to `said`."""
+    """The subsystem with its derived contract, and that contract as lines of text. Clauses are named ``camera.sharp``,
+    by the node inside; their cells (``camera.once#…``) are inputs. The clauses as written are added to `said`."""
     flat = frame.flat if isinstance(frame, Level) else frame
     ports: dict[Variable, Variable] = {}
     for port in (*face.node.outputs, *face.node.inputs):
@@ -167,8 +167,8 @@ def composed_node(frame: Frame, goal: Goal, face: Face, said: Said) -> tuple[Nod
 
 
 def _said(frame: Frame, name: ClauseName, said: Said) -> Term:
-    """A clause of a node or subsystem as it was written, over the whole system's values; what nobody wrote (that time
-    goes on) is as the calculus has it."""
+    """A clause of a node or subsystem as it was written, over the whole system's values; an unwritten one (that time
+    advances) in the form that the calculus uses."""
     if name in said:
         return said[name]
     flat = frame.flat if isinstance(frame, Level) else frame
@@ -178,11 +178,11 @@ def _said(frame: Frame, name: ClauseName, said: Said) -> Term:
 
 
 def carried(frame: Frame, goal: Goal, name: ClauseName) -> Term:
-    """An assumption that a subsystem's derivation leaves assumed, as the subsystem makes it: where it speaks of values
-    from inside, under what the nodes behind these guarantee at the same step (and assume: that is shown first).
+    """An assumption that a subsystem's derivation leaves assumed, as the subsystem makes it: if it mentions values from
+    inside, as an implication from the contracts, at the same step, of the nodes that produce them (their assumptions
+    are shown first).
 
-    A node to which the assuming one gives something at that step does not count: what it guarantees may rest on the
-    very assumption.
+    A node that the assuming node feeds at that step is left out: its guarantees may depend on this same assumption.
     """
     used = _carrying(frame, goal, name)
     return _under((frame.clause(each.node, each.clause) for each in used), frame.clause(name.node, name.clause))
@@ -212,8 +212,8 @@ def _carrying(frame: Frame, goal: Goal, name: ClauseName) -> tuple[ClauseName, .
 
 
 def with_persistence(frame: Level, goal: Goal) -> Goal:
-    """The goal with R3's hypothesis where a node is fed by several nodes inside one subsystem: seen from outside that
-    is one provider, and R1; but their outputs are used together all the same."""
+    """The goal, with R3's hypothesis if several nodes inside one subsystem feed a node. Seen from outside, they are one
+    provider (R1), but their outputs are still used together."""
     selected = frozenset(goal.nodes)
     found: list[str] = []
     for node in goal.nodes:
@@ -231,5 +231,5 @@ def with_persistence(frame: Level, goal: Goal) -> Goal:
 
 
 def innermost(name: str) -> str:
-    """``reader.scaled`` of ``robot.sensor.reader.scaled``: the node's own clause."""
+    """The node's own clause: ``reader.scaled`` for ``robot.sensor.reader.scaled``."""
     return ".".join(name.split(".")[-2:])

@@ -1,8 +1,8 @@
-"""Composed contracts as a transition system: which steps a system may take, judged by its contracts alone.
+"""Composed contracts as a transition system: the steps that a system may take according to its contracts alone.
 
-In a step the environment gives values, and the nodes answer in the order in which values flow: with any outputs that
-meet their guarantees (any at all where an assumption is broken). What delayed edges carry is the memory between steps.
-A function's values are decided where they are looked at first: by its node, or by who reads it, or by a property.
+In a step the environment gives values, and the nodes respond in the order in which values flow, with any outputs that
+satisfy their guarantees (any outputs at all if an assumption is broken). The values on delayed edges are the memory
+between steps. A function's values are decided when they are first read: by its node, by a consumer, or by a property.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ class Step:
 
     values: Mapping[str, Value] = field(hash=False)
     memory: tuple[object, ...]
-    """The key of the memory that it leaves."""
+    """The key of the memory after it."""
     broken: tuple[str, ...] = ()
     """Assumptions that do not hold at this step."""
 
@@ -60,7 +60,7 @@ class Step:
 
 @dataclass(frozen=True, slots=True)
 class Walk:
-    """A run: up to a node without an answer, or up to a step that leaves the memory that step `back` - 1 left."""
+    """A run: up to a node without an output, or up to a step with the same memory after it as after step `back` - 1."""
 
     steps: tuple[Step, ...]
     stuck: Stuck | None = None
@@ -69,20 +69,20 @@ class Walk:
 
 @dataclass(frozen=True, slots=True)
 class _Kept:
-    """What a clause remembers: before the first step, and what a step leaves."""
+    """A cell: its initial value, and its value after a step."""
 
     initial: Value
     now: Callable[[Mapping[str, Value]], Value]
 
 
 class Machine:
-    """The transition system of a composed system over its scenario. Raises CannotRun where it has none."""
+    """The transition system of a composed system over its scenario. Raises CannotRun if it has none."""
 
     def __init__(self, world: World, seed: int = 0, of: str = "") -> None:
         self.world = world
         self.frame = world.frame
         self.of = of
-        """The requirement for which more is remembered than clauses say."""
+        """The requirement whose cells are included."""
         self.graph = world.frame.graph
         self.seed = seed
         self.doubts = Doubts()
@@ -94,22 +94,22 @@ class Machine:
             )
             for name in self.order
         }
-        """What each node's inputs read."""
+        """The variables that each node's inputs read."""
         self.incomplete.update(self._unspecified())
         self.constants: list[str] = []
         self.cells = {called: self._kept(node, cell) for node, called, cell in self.frame.own_cells(of)}
-        """What each step leaves to the next of what clauses remember."""
+        """The cells of the clauses, by name."""
         self.supposed: dict[str, Holds] = {}
-        """What is assumed of the environment, of what is remembered too."""
+        """The environment assumptions that mention cells."""
         self.environment = self._environment()
         self.memory = tuple(dict.fromkeys(edge.source for edge in self.graph.edges if edge.delayed))
         self.freed = {node: f"{node}.broken{CELL}" for node in self.frame.cells}
-        """Whether an assumption of a node that remembers has been broken: it promises nothing from then on."""
+        """For each node with cells: whether an assumption has been broken; then its guarantees no longer apply."""
         self.remembered = (*self.constants, *map(str, self.memory), *self.cells, *self.freed.values())
         self.memories: dict[tuple[object, ...], Values] = {}
         self.stuck: dict[tuple[object, ...], Stuck] = {}
         self._begun: list[tuple[Endpoint, Term | None, Values, tuple[Value, ...]]] = []
-        """Each output's initial values, as found for what its node's inputs are then."""
+        """Each output's initial values, as found for the initial inputs of its node."""
         self._first: tuple[tuple[object, ...], ...] | None = None
         self._given_first: dict[tuple[object, ...], tuple[Values, ...]] = {}
         self._steps: dict[tuple[object, ...], tuple[Step, ...]] = {}
@@ -121,13 +121,13 @@ class Machine:
 
     @property
     def short(self) -> list[str]:
-        """Why what holds of every step found may not hold of every step that the scenario allows."""
+        """Why a property of every step found may not hold for every step that the scenario allows."""
         inexact = [f"{name} could be judged over the scenario's values only" for name in sorted(self.doubts.inexact)]
         return [*sorted(self.incomplete), *inexact]
 
     def look_for_cuts(self, deadline: float) -> None:
-        """Notes where the contracts allow an output that the scenario's values leave out: what follows on it was not
-        looked at. `deadline` is in units of `avow.solving.limits.spent`."""
+        """Notes each place where the contracts allow an output that the scenario's values leave out: its continuations
+        were not explored. `deadline` is in units of `avow.solving.limits.spent`."""
         for answerer in self.nodes.values():
             cut = first_cut(answerer, deadline)
             if cut:
@@ -140,7 +140,7 @@ class Machine:
                 self.incomplete.add(f"before the first step {endpoint} may have other values than the scenario's")
 
     def _unspecified(self) -> Iterator[str]:
-        """Of a type of which nothing is known one value is tried: all there is to it where no clause looks at it."""
+        """One value of an unspecified type is tried; this is exhaustive only if no clause mentions it."""
         for name in self.order:
             node = self.frame.node(name)
             spoken = {v for clause in node.clauses for v in ports_of(clause.formula)}
@@ -161,7 +161,7 @@ class Machine:
         return tuple(name for group in groups for name in group)
 
     def _environment(self) -> dict[tuple[object, ...], tuple[Values, ...]]:
-        """Every combination of what the environment may give at a step, by the values of its constants."""
+        """Every combination of environment inputs at a step, by the values of its constants."""
         names: dict[str, tuple[Value, ...]] = {}
         for endpoint in self.graph.environment:
             variable = self.frame.input(endpoint.node, endpoint.port)
@@ -221,14 +221,14 @@ class Machine:
     def _before_the_first(
         self, memory: tuple[object, ...], place: tuple[object, ...], given: Sequence[Values]
     ) -> tuple[object, ...]:
-        """The memory, for a first step at which the environment gives what the initial values were chosen for."""
+        """The memory for a first step with the environment inputs for which the initial values were chosen."""
         first = (*memory, ("first", *place))
         self.memories[first] = self.memories[memory]
         self._given_first[first] = tuple(given)
         return first
 
     def _initially(self, endpoint: Endpoint) -> tuple[Term | None, dict[str, str]]:
-        """What holds of an output before the first step, and what its node's inputs that this speaks of read."""
+        """The initial condition of an output, and the variables that its node's inputs mentioned there read."""
         edge = next(e for e in self.graph.edges if e.delayed and e.source == endpoint)
         condition = initial_condition(self.frame.system, edge)
         inputs = sorted({v.name for v in ports_of(condition) if v.role is Role.INPUT}) if condition is not None else []
@@ -262,7 +262,7 @@ class Machine:
         return found
 
     def _kept(self, node: str, cell: Cell) -> _Kept:
-        """Raises CannotRun for what cannot be computed step by step."""
+        """The cell as functions. Raises CannotRun if it cannot be computed step by step."""
         if cell.parameters or cell.initial is None:
             raise CannotRun(f"{node or self.of} remembers something for each of many values, or of an unspecified type")
         now = compile_term(self.frame.placed(node, cell.now))
@@ -282,13 +282,13 @@ class Machine:
         return found
 
     def _before(self, memory: tuple[object, ...]) -> Values:
-        """What a memory gives to the next step."""
+        """The values that a memory provides to the next step."""
         values = self.memories[memory]
         return {f"{name}@before": values[name] for name in (*map(str, self.memory), *self.cells, *self.freed.values())}
 
     def _given(self, memory: tuple[object, ...]) -> tuple[Values, ...]:
-        """What the environment may give after a memory, with what that gives to the step; nothing where nothing is as
-        it is assumed to be."""
+        """The possible environment inputs after a memory, together with the values from that memory; empty if none
+        satisfies the assumptions."""
         before = self._before(memory)
         choices = self._given_first.get(memory) or self.environment[memory[: len(self.constants)]]
         found = tuple(before | given for given in choices)
@@ -298,15 +298,15 @@ class Machine:
         return found
 
     def judge(self, formula: Term) -> Holds:
-        """Whether a formula holds of a step, with quantifiers over the scenario's values. It raises Undecided."""
+        """Whether a formula holds at a step, with quantifiers over the scenario's values. It raises Undecided."""
         return judge(self.world, formula, finite=True)
 
     # -- one run -------------------------------------------------------------------------------------------------------
 
     def walk(self, random: Random, length: int, *, until_repeat: bool = False, judges: Sequence[Holds] = ()) -> Walk:
-        """One run, chosen at random: each node answers what it is given with one of its allowed outputs.
+        """One random run: each node responds to its inputs with one of its allowed outputs.
 
-        `judges`: what will be judged of the steps; it decides what they have to know.
+        `judges`: the state formulas that will be evaluated; they determine which open values are decided.
         """
         memory = random.choice(self.initial())
         steps: list[Step] = []
@@ -334,13 +334,13 @@ class Machine:
     # -- steps ---------------------------------------------------------------------------------------------------------
 
     def steps(self, memory: tuple[object, ...]) -> tuple[Step, ...]:
-        """Every step from a memory. Where some node has no answer to what it may be given, see `stuck`."""
+        """Every step from a memory. `stuck` records nodes without an output for some possible input."""
         if memory not in self._steps:
             self._steps[memory] = tuple(self._all_steps(memory))
         return self._steps[memory]
 
     def judged(self, memory: tuple[object, ...], judges: Sequence[Holds]) -> Iterator[Step]:
-        """Every step from a memory, with as much decided as is needed to judge it."""
+        """Every step from a memory, with as many values decided as are needed to judge it."""
         for step in self.steps(memory):
             partial: list[Values] = [dict(step.values)]
             for holds in judges:
@@ -371,8 +371,8 @@ class Machine:
     def _extended(
         self, name: str, values: Values, random: Random | None = None
     ) -> list[tuple[Values, tuple[str, ...]]]:
-        """The values with each answer of a node, and the assumptions of it that do not hold; what it has to know
-        of open values is decided first (in each way, or at random)."""
+        """The values with each output of a node, and its broken assumptions; the open values that it reads are decided
+        first (in each way, or at random)."""
         node, freed = self.nodes[name], self.freed.get(name)
         waiting, found = [values], []
         while waiting:
@@ -395,7 +395,7 @@ class Machine:
         return found
 
     def _settled(self, values: Values, holds: Holds, random: Random | None = None) -> list[Values]:
-        """The values with as much decided as is needed to judge them."""
+        """The values with as many open points decided as are needed to judge them."""
         waiting, found = [values], []
         while waiting:
             values = waiting.pop()
@@ -408,7 +408,7 @@ class Machine:
         return found
 
     def _decided(self, values: Values, name: str, point: tuple[Value, ...], random: Random | None) -> list[Values]:
-        """The values with a point of an open output decided, in each way (or at random in one)."""
+        """The values with one point of an open output decided, in each way (or in one way at random)."""
         node, _, port = name.partition("@")[0].partition(".")
         choices = self.nodes[node].choices[f"out.{port}"]
         if choices.values is None:

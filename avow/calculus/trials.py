@@ -1,8 +1,8 @@
-"""What the failure rate of a requirement may be composed of, where guarantees beneath it are sampled.
+"""The guarantees from whose failure rates that of a requirement may be composed, if they are sampled.
 
-A requirement that demands something from 5 m/s on is not tried by trials at 1 m/s, whatever a guarantee for all speeds
-says of them. So a guarantee is *beyond* a requirement unless each of its trials, as far as its node's ports show it,
-meets the requirement's condition too (or none can).
+Trials at 1 m/s do not test a requirement that demands something from 5 m/s on, even if they test a guarantee for all
+speeds. So a guarantee is *beyond* a requirement unless each of its trials, as far as its node's ports show, also meets
+the requirement's condition (or none can).
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from avow.sanity.claims import triggers
 
 
 def composes(frame: Frame, goal: Term, found: Established) -> dict[str, object]:
-    """`at_once`: the requirement fails at a step only where a guarantee does at this step. `beyond`: as above."""
+    """`at_once`: the requirement fails at a step only if a guarantee fails at this step. `beyond`: as above."""
     nodes, asked = frame.system.contract.nodes, triggers(goal)
     remembering = [need.node for need in found.hypotheses if need.kind is How.GUARANTEE]
     return {
@@ -45,7 +45,7 @@ def _beyond(frame: Frame, node: Node, clause: str, asked: tuple[Term, ...]) -> b
 
 
 def _seen(condition: Term, own: set[Variable]) -> Term:
-    """What of a condition the ports of a node show, with all that is remembered for the requirement only."""
+    """The part of a condition over the ports of a node and the cells of requirements."""
 
     def shown(term: Term) -> bool:
         return all(v in own or v.name.startswith(OBSERVED) for v in free_variables(term))

@@ -1,7 +1,8 @@
 """One set of variables for a whole system: linking equations are solved by giving both ends of an edge one name.
 
 The output `at` of `navigation` is ``navigation.at`` wherever it flows; ``navigation.at@before`` is its value one step
-earlier (what a delayed edge delivers); an input that no node provides is ``in.map``, one for all nodes that read it.
+earlier (delivered by a delayed edge); an input that no node provides is ``in.map``, one variable for all nodes that
+read it.
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ from avow.system.plan import Edge, Endpoint, System
 from avow.system.temporal import parse_state
 
 OBSERVED = "requirement "
-"""Begins the name of what is remembered for a requirement (``requirement R.once#…``), and that of no port."""
+"""Prefix of the name of a cell of a requirement (``requirement R.once#…``); no port's name begins with it."""
 
 SUFFIXES = ("", "@before", "@before@before")
 """Now, one step earlier, two steps earlier."""
@@ -38,14 +39,14 @@ SUFFIXES = ("", "@before", "@before@before")
 
 @dataclass(frozen=True, slots=True)
 class Facts:
-    """Labelled facts, found by the variables that they speak of."""
+    """Labelled facts, indexed by the variables that they mention."""
 
     terms: Mapping[str, Term]
     variables: Mapping[str, frozenset[Variable]]
     speaking: Mapping[Variable, tuple[str, ...]]
-    """Variable → the labels of the facts that speak of it."""
+    """Variable → the labels of the facts that mention it."""
     rarest: Mapping[Variable, tuple[str, ...]]
-    """Variable → the labels of those of which it is the variable that the fewest others speak of."""
+    """Variable → the labels of the facts of whose variables it is the rarest, mentioned by the fewest other facts."""
     digest: str
     """SHA-256 of labels and meanings."""
 
@@ -70,8 +71,8 @@ def _frozen(lists: Mapping[Variable, list[str]]) -> dict[Variable, tuple[str, ..
 
 
 def closest(parts: Iterable[Facts], goal: Term) -> dict[str, Term]:
-    """The facts that share a variable with the goal, and then those *all* of whose variables occur in these: bounds of
-    what the first speak of. To share one is not enough there: one step further, everything would come in."""
+    """The facts that share a variable with the goal, and then those *all* of whose variables occur in these: bounds on
+    what the first mention. Sharing one variable is not enough there: one step further would include everything."""
     parts = tuple(parts)
     spoken = free_variables(goal)
     direct = [{label for variable in spoken for label in part.speaking.get(variable, ())} for part in parts]
@@ -89,8 +90,8 @@ Label = TypeVar("Label")
 
 
 def bearing(facts: Mapping[Label, Term], spoken: Iterable[Variable], *, direct: bool = False) -> dict[Label, Term]:
-    """The facts that share a variable with some that are spoken of, or (unless `direct`) with one another down to
-    these. What shares none cannot help a proof, and may keep the solver busy for long."""
+    """The facts that share a variable with the given ones, directly or (unless `direct`) through other facts. Other
+    facts cannot help a proof, and may keep the solver busy for long."""
     left = {label: free_variables(fact) for label, fact in facts.items()}
     known = set(spoken)
     found: dict[Label, Term] = {}
@@ -105,8 +106,8 @@ def bearing(facts: Mapping[Label, Term], spoken: Iterable[Variable], *, direct: 
 
 @dataclass(frozen=True, slots=True)
 class Observed:
-    """A requirement that speaks of other steps: its formula as one of a step, over ``node.port`` and its cells. What it
-    remembers is remembered whatever the nodes do. `unsaid`: why there is no such formula."""
+    """A requirement that mentions other steps: its formula as one over a single step, over ``node.port`` and its cells.
+    The cells are updated whatever the nodes do. `unsaid`: why there is no such formula."""
 
     formula: Term
     cells: tuple[Cell, ...] = ()
@@ -114,12 +115,12 @@ class Observed:
 
     @property
     def spoken(self) -> frozenset[Variable]:
-        """What the formula, and what it remembers, speak of."""
+        """The variables that the formula and its cells mention."""
         return free_variables(self.formula).union(*(free_variables(cell.now) for cell in self.cells))
 
     @property
     def arrivals(self) -> tuple[tuple[str, str], ...]:
-        """Nodes, and of which of their inputs it matters whether a message has arrived (``arrived scan#``)."""
+        """Nodes, and those of their inputs for which it matters whether a message has arrived (``arrived scan#``)."""
         names = (v.name.partition(".") for v in self.spoken if v.name.endswith(CELL) and ".arrived " in v.name)
         return tuple(sorted((node, event) for node, _, event in names))
 
@@ -132,27 +133,27 @@ class Frame:
     graph: Graph
     assumed: tuple[Assumed, ...]
     own_inputs: Mapping[str, str]
-    """Inputs (``planner.map``) that the plan sets apart from the inputs of that name that others read → as whose."""
+    """Inputs (``planner.map``) separate from other nodes' inputs of that name → the input whose name they use."""
     constants: frozenset[str]
-    """Environment inputs (``in.map``, ``planner.map``) that keep their value."""
+    """Environment inputs (``in.map``, ``planner.map``) that are constant."""
 
     cells: Mapping[str, tuple[Cell, ...]] = field(default_factory=dict)
-    """Node → what its clauses remember, and what the plan assumes of its inputs; each is an input of the node, by the
-    cell's name."""
+    """Node → the cells of its clauses and of the plan's assumptions about its inputs; each is an input of the node,
+    with the cell's name."""
 
     shared: dict[str, str] = field(default_factory=dict)
-    """A cell (``log.earliest#…``) that keeps what another does → that one: where time matters, several nodes may look
-    at the age of the same; and what a requirement remembers, a node may remember as well."""
+    """A cell (``log.earliest#…``) that keeps the same as another → that one: if time matters, several nodes may use the
+    age of the same value; and a node and a requirement may have the same cell."""
 
     required: Mapping[str, Term] = field(default_factory=dict)
     """The formulas of requirements, over ``node.port``."""
 
     observed: Mapping[str, Observed] = field(default_factory=dict)
-    """The requirements that speak of other steps."""
+    """The requirements that mention other steps."""
 
     left_out: tuple[str, ...] = ()
-    """Guarantees (``sensor.soon``), and what the plan assumes (``in.x``), with limits in seconds that have no formula
-    of one step: no hypothesis says them, so that no example, of a step or of a run, is known to keep to them."""
+    """Guarantees (``sensor.soon``) and assumptions of the plan (``in.x``) with limits in seconds and no formula over
+    one step: they are not hypotheses, so an example (a step or a run) may violate them."""
 
     _nodes: dict[str, Node] = field(default_factory=dict)
     _mappings: dict[tuple[str, int], Mapping[Variable, Term]] = field(default_factory=dict)
@@ -170,19 +171,19 @@ class Frame:
         if key not in self._terms:
             formula = self.node(node).clause(clause).formula
             mapping = self.mapping(node, earlier)
-            spoken = free_variables(formula)  # of many ports, a clause speaks of few
+            spoken = free_variables(formula)  # a clause mentions few of many ports
             self._terms[key] = substitute(formula, {v: mapping[v] for v in spoken if v in mapping})
         return self._terms[key]
 
     def promised(self, node: str, earlier: int = 0) -> Facts:
-        """As `contracts`, of one node."""
+        """The same as `contracts`, for one node."""
         key = (node, earlier)
         if key not in self._facts:
             self._facts[key] = indexed(self.contracts((node,), earlier))
         return self._facts[key]
 
     def contracts(self, nodes: Iterable[str], earlier: int = 0) -> dict[str, Term]:
-        """All that some nodes' contracts say, `earlier` steps ago, labelled ``navigation.somewhere``."""
+        """All clauses of some nodes' contracts, `earlier` steps ago, labelled ``navigation.somewhere``."""
         suffix = " one step before" if earlier else ""
         return {
             f"{node}.{clause.name}{suffix}": self.clause(node, clause.name, earlier)
@@ -191,14 +192,14 @@ class Frame:
         }
 
     def surroundings(self, earlier: int = 0) -> Facts:
-        """As `environment`."""
+        """The facts of `environment` and `memory`."""
         key = (frozenset[str](), earlier)
         if key not in self._facts:
             self._facts[key] = indexed(self.environment(earlier) | self.memory(earlier))
         return self._facts[key]
 
     def beginnings(self, nodes: frozenset[str]) -> Facts:
-        """As `initials`."""
+        """The facts of `initials` and `blank`."""
         key = (nodes, 1)
         if not nodes:
             return indexed({})
@@ -242,17 +243,18 @@ class Frame:
         return self.output(edge.source.node, edge.source.port, earlier + (1 if edge.delayed else 0))
 
     def keeper(self, node: str, cell: str) -> str:
-        """The name of the cell that keeps what a cell of a node does."""
+        """The name of the cell that stands in for a cell of a node (itself, unless shared)."""
         return self.shared.get(f"{node}.{cell}", f"{node}.{cell}")
 
     def own_cells(self, of: str = "") -> tuple[tuple[str, str, Cell], ...]:
-        """Every cell, each kept once, with its node and its name; those `of` a requirement have no node."""
+        """Every cell once, with its node and its name; those `of` a requirement have no node."""
         found = [(node, f"{node}.{cell.name}", cell) for node, cells in self.cells.items() for cell in cells]
         found += [("", cell.name, cell) for cell in (self.observed[of].cells if of in self.observed else ())]
         return tuple(each for each in found if each[1] not in self.shared)
 
     def share(self) -> None:
-        """Cells that begin and go on alike are one: those of requirements and nodes, and where time matters all."""
+        """Merge cells with the same initial value and update: those of requirements with those of nodes and, if time
+        matters, all."""
         for of in self.observed or ("",):
             kept: dict[str, str] = {}
             for node, called, cell in self.own_cells(of):
@@ -264,18 +266,18 @@ class Frame:
                 other = kept.setdefault(meaning, called)
                 if other != called and (self.timed or not node):
                     self.shared[called] = other
-                    self._mappings.clear()  # what reads the one reads the other from here on
+                    self._mappings.clear()  # readers of one cell read the other from here on
 
     def placed(self, node: str, term: Term, earlier: int = 0) -> Term:
-        """A term over a node's ports (``node.port`` where there is no node) in system-level variables."""
+        """A term over a node's ports (``node.port`` without a node) in system-level variables."""
         return substitute(term, self.mapping(node, earlier)) if node else system_term(self, term, earlier)
 
     def entry(self, node: str, port: str) -> str:
-        """What the plan calls an input from the environment: ``in.map``, or ``planner.map`` where it is set apart."""
+        """The plan's name for an input from the environment: ``in.map``, or ``planner.map`` if it is separate."""
         return self.own_inputs.get(f"{node}.{port}", f"in.{port}")
 
     def environment(self, earlier: int = 0) -> dict[str, Term]:
-        """What the plan assumes of the environment, labelled ``environment in.map``."""
+        """The plan's assumptions about the environment, labelled ``environment in.map``."""
         if earlier not in self._environment:
             suffix = " one step before" if earlier else ""
             self._environment[earlier] = {
@@ -285,8 +287,8 @@ class Frame:
         return dict(self._environment[earlier])
 
     def memory(self, earlier: int = 0, of: str = "") -> dict[str, Term]:
-        """What each step leaves to the next, as functions of its values, labelled ``memory navigation.once#…``; also
-        what is remembered for a requirement (`of`)."""
+        """The definitions of the cells after each step as functions of its values; also those for a requirement (`of`).
+        The labels are ``memory navigation.once#…``."""
         suffix = " one step before" if earlier else ""
         found = {
             f"memory {called}{suffix}": self.placed(
@@ -301,12 +303,12 @@ class Frame:
 
     @property
     def timed(self) -> tuple[str, ...]:
-        """The nodes to whose clauses the time between steps matters; where it does to requirements only, any."""
+        """The nodes whose clauses depend on the time between steps; any node, if only requirements do."""
         found = tuple(n for n in self.cells if any(port.variable == CLOCK for port in self.node(n).inputs))
         return found or self.graph.nodes[:1] if any(CLOCK in o.spoken for o in self.observed.values()) else found
 
     def blank(self, of: str = "") -> dict[str, Term]:
-        """What is remembered before the first step, also for a requirement (`of`)."""
+        """The initial values of the cells, also for a requirement (`of`)."""
         return {
             f"initial {called}": self.placed(node, cell.begins())
             for node, called, cell in self.own_cells(of)
@@ -314,11 +316,11 @@ class Frame:
         }
 
     def remembering(self, nodes: Iterable[str]) -> bool:
-        """Whether what some of these nodes say is of other steps, too."""
+        """Whether some of these nodes have cells: clauses about other steps."""
         return any(name in self.cells for name in nodes)
 
     def behind(self, node: str, formula: Term) -> tuple[tuple[Variable, bool], ...]:
-        """The ports of a node that a formula speaks of, and whether of their values at earlier steps, by a cell."""
+        """The ports of a node that a formula mentions, and whether it mentions their earlier values, through a cell."""
         known = {cell.name: cell for cell in self.cells.get(node, ())}
         found: dict[tuple[Variable, bool], None] = {}
         seen: set[str] = set()
@@ -333,7 +335,7 @@ class Frame:
         return tuple(found)
 
     def initials(self, nodes: Iterable[str]) -> dict[str, Term]:
-        """What holds before the first step of the outputs of `nodes` that feed delayed edges."""
+        """The conditions before the first step on the outputs of `nodes` that feed delayed edges."""
         if self._initials is None:
             found: dict[str, dict[str, Term]] = {}
             for edge in self.graph.edges:
@@ -356,7 +358,7 @@ class Frame:
 
 
 def frame(system: System) -> Frame:
-    """Raises Rejected where the plan's formulas are wrong."""
+    """The frame of a system. Raises Rejected if the plan's formulas are wrong."""
     graph = dataflow(system)
     required = {
         r.id: parse_state(r.formula, system.contract, r.formula_span)
@@ -367,7 +369,7 @@ def frame(system: System) -> Frame:
 
 
 def framed(system: System, graph: Graph, assumed: Sequence[Assumed], required: Mapping[str, Term]) -> Frame:
-    """The frame of a system of whose environment something is assumed, and of which something is required."""
+    """The frame of a system with the given environment assumptions and requirements."""
     speaking = {name: term for name, term in required.items() if histories(term)}
     clauses = (c.formula for n in system.contract.nodes for c in n.clauses)
     longest = longest_limit((*clauses, *(a.formula for a in assumed), *speaking.values()))
@@ -400,14 +402,14 @@ def framed(system: System, graph: Graph, assumed: Sequence[Assumed], required: M
 
 
 def _unsaid(clause: Term, said: Term) -> bool:
-    """Whether a clause with limits in seconds has no formula of one step. (`eventually` no first steps can break.)"""
+    """Whether a clause with limits in seconds has no formula over one step. (No first steps violate `eventually`.)"""
     return said == TRUE and timed(clause) is not None
 
 
 def _of_one_step(
     node: Node, assumed: Sequence[Assumed], longest: Fraction | None, *, together: bool
 ) -> tuple[Node, tuple[Cell, ...], list[Assumed]]:
-    """A node whose clauses are of one step, its cells, and what the plan assumes of its inputs, of one step too."""
+    """The node with clauses over one step, its cells, and the plan's assumptions on its inputs, also over one step."""
     if not remembers(node) and not any(histories(a.formula) for a in assumed):
         return node, (), list(assumed)
     supposed = tuple(Clause(ClauseKind.ASSUMPTION, f"{a.port}{CELL}", 0, a.formula) for a in assumed)
@@ -415,7 +417,7 @@ def _of_one_step(
     made = compile_timed(whole, longest) if together else compile_node(whole)
     read = (*made.before, *events(made))
     ports = tuple(Port(Role.INPUT, v.name, v.sort, show_sort(v.sort)) for v in read)
-    # what has no formula of one step is no hypothesis; a node's assumption that has none stays, and open
+    # a clause without a formula over one step is no hypothesis; such an assumption of a node stays, and open
     said = {c.name: TRUE if c.name in made.unsaid else c.formula for c in made.node.clauses}
     kept = tuple(replace(g, formula=said[g.name]) for g in made.node.guarantees)
     known = made.node.assumptions[: len(node.assumptions)]
@@ -424,7 +426,7 @@ def _of_one_step(
 
 
 def observing(name: str, formula: Term, longest: Fraction | None, *, together: bool) -> Observed:
-    """A requirement that speaks of other steps, as one of a step. `together`: there is one time for all nodes."""
+    """A requirement that mentions other steps, as a formula over one step. `together`: all nodes share one clock."""
     records = Timed(longest=longest) if together else Records()
     try:
         said = records.clause(formula)
@@ -440,12 +442,12 @@ def observing(name: str, formula: Term, longest: Fraction | None, *, together: b
 
 
 def system_variable(name: str, sort: Sort, earlier: int = 0) -> Variable:
-    """A variable of the whole system; its name holds a dot, so that no bound variable can bear it."""
+    """A variable of the whole system; its name contains a dot, so that it differs from every bound variable."""
     return Variable(Role.BOUND, name + SUFFIXES[earlier], sort)
 
 
 def system_term(frame: Frame, formula: Term, earlier: int = 0) -> Term:
-    """A formula over ``node.port``, and over what is remembered for a requirement, in system-level variables."""
+    """A formula over ``node.port`` and a requirement's cells in system-level variables."""
     mapping: dict[Variable, Term] = {}
     for variable in free_variables(formula):
         node, _, port = variable.name.partition(".")

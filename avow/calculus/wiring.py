@@ -1,11 +1,11 @@
-"""A system as the kernel is told of it: its contracts, the wires of its dataflow graph, and the plan's formulas.
+"""A system as the kernel receives it: its contracts, the wires of its dataflow graph, and the plan's formulas.
 
-Cells, in which clauses remember, are outputs of their own (`SoundWithMemory` in proofs/kernel.dfy: what a step leaves
-there is a definition); several publishers of a topic are a node that puts out what one of them does.
+Cells (the state variables of clauses) are outputs of their own (`SoundWithMemory` in proofs/kernel.dfy: a cell's value
+after a step is a definition). Several publishers of a topic are a node whose output is that of one of them.
 
-Of a loop it is asked whether there are first values, and of a guarantee in a circle whether the situation that it is
-about can arise. From these claims nothing is derived: the kernel asks for values that meet them, and takes no proof
-that there are none for an answer.
+Two claims are existential: a loop has first values, and the situation that a guarantee in a cycle is about can arise.
+Nothing is derived from them: the kernel asks for values that satisfy them, and does not accept a proof that there are
+none.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from avow.system.plan import Edge
 
 
 def wiring(frame: Frame) -> Wiring:
-    """Of the frame of every node by itself. Raises Rejected for a formula that is wrong."""
+    """The wiring of the frame in which every node is a node of its own. Raises Rejected if a formula is wrong."""
     system, graph = frame.system, frame.graph
     plan: list[tuple[Claimed, str, str, Term]] = []
     initials: dict[tuple[str, str], Term] = {}
@@ -57,20 +57,20 @@ def wiring(frame: Frame) -> Wiring:
     return Wiring(tuple(frame.node(n.name) for n in system.contract.nodes), _ports(frame), tuple(plan))
 
 
-# What an example shows: that a loop has first values, that a situation that a guarantee is about can arise. Nothing is
-# derived from these claims. Each is a formula over ``node.port``, which some values have to meet: the kernel asks for
-# values, and takes no proof that there are none for an answer.
+# Existential claims, shown by an example: a loop has first values; a situation that a guarantee is about can arise.
+# Nothing is derived from them. Each is a formula over ``node.port`` that some values have to satisfy: the kernel asks
+# for values, and does not accept a proof that there are none.
 
 
 def loops(frame: Frame) -> Iterator[tuple[str, ...]]:
-    """Nodes that feed one another in a circle, at once or delayed."""
+    """Nodes that feed one another in a cycle, with or without delay."""
     arcs = [(e.source.node, e.target.node) for e in frame.graph.edges]
     selves = {source for source, target in arcs if source == target}
     yield from (g for g in components(frame.graph.nodes, arcs) if len(g) > 1 or g[0] in selves)
 
 
 def circles(frame: Frame) -> Iterator[tuple[str, ...]]:
-    """Nodes that feed one another in a circle within one step."""
+    """Nodes that feed one another in a cycle within one step."""
     arcs = [(e.source.node, e.target.node) for e in frame.graph.edges if not e.delayed]
     yield from (group for group in components(frame.graph.nodes, arcs) if len(group) > 1)
 
@@ -85,7 +85,7 @@ def joined(names: Sequence[str]) -> str:
 
 
 def _beginning(frame: Frame, group: Iterable[str]) -> Term:
-    """What the plan says of the outputs of a loop before the first step, over ``node.port``."""
+    """The plan's conditions on the outputs of a loop before the first step, over ``node.port``."""
     members = frozenset(group)
     first: dict[str, Edge] = {str(e.source): e for e in frame.graph.edges if e.delayed and e.source.node in members}
     found = [(e.source.node, initial_condition(frame.system, e)) for e in first.values()]
@@ -93,8 +93,8 @@ def _beginning(frame: Frame, group: Iterable[str]) -> Term:
 
 
 def _situations(frame: Frame, group: Sequence[str], node: str, clause: str) -> Iterator[tuple[Claimed, str, str, Term]]:
-    """Of each situation that a guarantee of a node in a circle is about: that it arises while all nodes of the circle
-    keep their contracts; and that its node's own contract leaves it no room, which composing does not change."""
+    """Two claims for each situation that a guarantee of a node in a cycle is about: that it arises while all nodes of
+    the cycle keep their contracts, and that its node's own contract excludes it, which composition does not change."""
     contracts = {name: [_qualified(each.formula, name) for each in frame.node(name).clauses] for name in group}
     everything = [term for terms in contracts.values() for term in terms]
     everything += [_qualified(assumed.formula, assumed.node) for assumed in frame.assumed]
@@ -112,7 +112,8 @@ def _qualified(term: Term, node: str) -> Term:
 
 
 def _ports(frame: Frame) -> dict[tuple[Role, str, str], Place]:
-    """What each port is: the value of an output, now or (over a delayed edge) a step before, or of the environment."""
+    """The value that each port has: that of an output, now or (over a delayed edge) one step before, or of the
+    environment."""
     outputs = {
         (node.name, port.name): Place(f"{node.name}.{port.name}", node.name, 0, port.sort)
         for node in frame.system.contract.nodes
@@ -144,7 +145,7 @@ def _ports(frame: Frame) -> dict[tuple[Role, str, str], Place]:
         for node, event in observed.arrivals:
             found[Role.INPUT, node, event] = Place(f"in.{node}.{event}", None, 0, BOOL)
         for cell in observed.cells:
-            # it is remembered of steps of the node that is spoken of; of several, of all nodes
+            # the cell counts steps of the node that it mentions; if it mentions several, of all nodes
             nodes = {v.name.partition(".")[0] for v in observed.spoken if CELL not in v.name}
             owner, _, name = cell.name.partition(".")
             keep((owner, name), cell.name, nodes.pop() if len(nodes) == 1 else owner, cell.sort)
