@@ -1,4 +1,4 @@
 """Is a contract worth verifying? Realizability, conflicts, vacuity, redundancy, with witnesses and counterexamples.
 
-Front doors: `avow.sanity.claims` (what is asked), `avow.sanity.analysis` (the answers).
+Start reading at: `avow.sanity.claims` (the claims), `avow.sanity.analysis` (the answers).
 """

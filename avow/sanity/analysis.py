@@ -1,9 +1,9 @@
-"""Is a contract worth verifying? The sanity claims of a node (`avow.sanity.claims`), settled by the solver.
+"""Is a contract worth verifying? The sanity claims of a node (`avow.sanity.claims`), decided by the solver.
 
 `proved` is always good and `refuted` always bad (see the table in `avow.sanity.claims`). A refutation carries a
-replayed counterexample in the contract's words, or the smallest conflicting sets of clauses, or both. What the solver
-cannot decide stays `unknown`; with a scenario (concrete values of some inputs), a claim about all inputs that stays
-unknown is tried for these values, and if it holds there it is `checked`, and says that it is bounded.
+replayed counterexample in the contract's terms, or the smallest conflicting sets of clauses, or both. A claim that the
+solver cannot decide stays `unknown`. With a scenario (concrete values of some inputs), an unknown claim about all
+inputs is tried for these values; if it holds there, it is `checked` and marked as bounded.
 """
 
 from __future__ import annotations
@@ -50,10 +50,10 @@ def analyse(
     bounds: Bounds | None = None,
     wanted: Collection[str] | None = None,
 ) -> tuple[SanityResult, ...]:
-    """Settle a node's claims, in their order; with `wanted`, only the claims of these names are told. What comes before
-    them is asked all the same: claims that stay open leave less effort for later ones, and no answer is to depend on
-    what is wanted. `scenario` fixes some inputs, `ranges` says which few values others (and quantified variables) have,
-    where no answer for all is found.
+    """Decide a node's claims, in order; with `wanted`, only the claims of these names are reported. Earlier claims are
+    decided all the same: claims that stay open leave less effort for later ones, and no answer may depend on `wanted`.
+    `scenario` fixes some inputs; `ranges` gives the few values of others (and of quantified variables), if no answer
+    for all values is found.
     """
     bounds = bounds or Bounds()
     analysis = (
@@ -87,7 +87,7 @@ def outcomes(
 
 
 class _Analysis:
-    """One node under analysis. Each claim is settled once, others ask for it."""
+    """One node under analysis. Each claim is decided once and reused by others."""
 
     def __init__(self, node: Node, scenario: Given, ranges: Ranges, bounds: Bounds) -> None:
         self.node = node
@@ -118,7 +118,7 @@ class _Analysis:
 
     @property
     def limit(self) -> int:
-        """Effort for a question of the claim that is being settled."""
+        """Effort for one query of the current claim."""
         return self.patience.effort(self.serious)
 
     def _settle(self, claim: Claim) -> Finding:
@@ -146,7 +146,7 @@ class _Analysis:
         return self._with_all_sets(finding, self.assumptions)
 
     def _in_every_size(self, finding: Finding, because: str = "") -> Finding:
-        """What was not refuted is, if it fails for some number of elements of the unspecified types."""
+        """The finding, turned into a refutation if it fails for some number of elements of the unspecified types."""
         if finding.verdict in (Verdict.REFUTED, Verdict.ERROR):
             return finding
         verdict, reason = in_every_size(
@@ -172,7 +172,7 @@ class _Analysis:
         return self._with_all_sets(finding, together)
 
     def _with_all_sets(self, finding: Finding, formulas: Mapping[str, Term]) -> Finding:
-        """Where formulas contradict each other, every smallest set of them that does."""
+        """The finding with every minimal set of contradictory formulas, if they contradict each other."""
         if finding.verdict is not Verdict.REFUTED or not finding.clauses:
             return finding
         sets, complete = contradictions(formulas, finding.clauses, effort=self.patience.full // 2, seed=self.seed)
@@ -185,7 +185,7 @@ class _Analysis:
         )
 
     def _realizability(self) -> tuple[Realizability, bool]:
-        """The answer, and whether it is about the scenario only."""
+        """The answer, and whether it holds only for the scenario."""
         if self.answer is not None:
             return self.answer
         start = spent()
@@ -251,7 +251,7 @@ class _Analysis:
         if not listed:
             shown = Counterexample(show_values(answer.inputs), "no output meets the guarantees here")
             return Finding(Verdict.REFUTED, shown.explanation, answer.group, shown, engine=answer.engine)
-        # A conflict between guarantees tells more than one guarantee that cannot be met by itself.
+        # A conflict between guarantees is more informative than one guarantee that cannot be met by itself.
         clauses, shown = next((pair for pair in listed if len(pair[0]) > 1), listed[0])
         because = "consistent" if self._other("consistent").verdict is Verdict.REFUTED else None
         text = f"for some inputs no output meets {listing(clauses)}{'' if complete else CUT_SHORT}"
@@ -276,7 +276,7 @@ class _Analysis:
     def _not_vacuous(self, name: str) -> Finding:
         impossible = []
         undecided: Finding | None = None
-        broken = self._example(f"not-tautological-{name}")  # a guarantee is broken only where it is demanded
+        broken = self._example(f"not-tautological-{name}")  # a guarantee is broken only if its condition holds
         asked = triggers(self.guarantees[name])
         for trigger in asked:
             if _meets(broken, (*self.assumptions.values(), trigger)):
@@ -321,7 +321,7 @@ class _Analysis:
         unused = Finding(Verdict.REFUTED, "every guarantee can be met without it", (name,), because=because)
         if self._other("realizable").verdict is Verdict.PROVED and name not in self._realizability()[0].needed:
             return unused
-        # What it rules out is all that there is to ask about: an output for each of these inputs makes it idle.
+        # Only the inputs that it rules out matter: it is not needed if each of them has an output.
         outside = {label: negation(f) if label == name else f for label, f in self.assumptions.items()}
         answer = realizable(
             self.inputs,
@@ -337,7 +337,7 @@ class _Analysis:
                 return Finding(Verdict.PROVED, engine=answer.engine)
             case Verdict.PROVED:
                 return replace(unused, engine=answer.engine)
-            case _:  # no answer
+            case _:  # undecided
                 return Finding(Verdict.UNKNOWN, "whether the guarantees could be met without it is open")
 
     # -- one output ----------------------------------------------------------------------------------------------------
@@ -362,7 +362,7 @@ class _Analysis:
     def _determined(self, name: str) -> Finding:
         output = self.node.output(name).variable
         alone = Group({}, (output,))
-        # Outputs that hang together with this one by shared guarantees may differ too; all others stay the same.
+        # Outputs connected to this one by shared guarantees may differ too; all others stay the same.
         group = next((g for g in groups(self.guarantees, self.outputs) if output in g.outputs), alone)
         again = {v: Variable(Role.OUTPUT, f"{v.name} (another)", v.sort) for v in group.outputs}
         question = {
@@ -391,27 +391,27 @@ class _Analysis:
     # -- asking --------------------------------------------------------------------------------------------------------
 
     def _attempts(self) -> tuple[Given, ...]:
-        """Without the scenario first: an answer without it is worth more."""
+        """First without the scenario: an answer without it is stronger."""
         return ({}, self.scenario) if self.scenario else ({},)
 
     def _some(self, assumed: Mapping[str, Term]) -> bool:
-        """Whether any input of the scenario meets these: without one, nothing has been checked."""
+        """Whether any input of the scenario satisfies these: without one, nothing has been checked."""
         return solve(assumed, effort=self.limit, given=self.scenario, values="unused").status == "sat"
 
     def _if_refuted(self, name: str) -> str | None:
         return name if name in self.claims and self._other(name).verdict is Verdict.REFUTED else None
 
     def _example(self, name: str) -> Given:
-        """Values that show another claim; none where there is no such claim, or none are known."""
+        """Values that show another claim; empty if there is no such claim, or none are known."""
         return self._other(name).example if name in self.claims else {}
 
     def _possible(self, formulas: Mapping[str, Term], several: str, one: str, limit: int | None = None) -> Finding:
-        """Can they hold together? If not, the texts say so of the smallest set that cannot."""
+        """Can the formulas hold together? If not, `several` or `one` is the text for the smallest set that cannot."""
         limit = min(limit or self.limit, self.limit)
         answer = solve(formulas, effort=limit, seed=self.seed, values="unused")
         if answer.status == "unknown" and self.scenario:
             within = solve(formulas, effort=limit, seed=self.seed, given=self.scenario)
-            # An example in the scenario is an example; that there is none in it proves nothing.
+            # An example in the scenario counts; the absence of one proves nothing.
             answer = within if within.status == "sat" else answer
         if answer.status == "unknown" and self._by_definitions(formulas, limit // 2):
             return Finding(Verdict.PROVED)
@@ -429,11 +429,12 @@ class _Analysis:
                 assert_never(answer.status)
 
     def _by_definitions(self, formulas: Mapping[str, Term], limit: int) -> bool:
-        """Whether these hold together, for functions that have no finite table."""
+        """Whether these hold together, for functions without a finite table."""
         return _are_endless(formulas.values()) and possible(formulas, effort=limit, seed=self.seed)
 
     def _fails_somewhere(self, hypotheses: Mapping[str, Term], formula: Term, alone: str, implied: str) -> Finding:
-        """Is there a case where the hypotheses hold and the formula does not? If not, the texts say so."""
+        """Is there a case where the hypotheses hold and the formula does not? `alone` and `implied` are the texts if
+        not."""
         finding = self._possible({**hypotheses, "": negation(formula)}, "", "")
         if finding.verdict is not Verdict.REFUTED:
             return finding
@@ -443,14 +444,14 @@ class _Analysis:
 
 
 def _are_endless(formulas: Iterable[Term]) -> bool:
-    """Whether they speak of functions that need not have a finite table."""
+    """Whether they mention functions that need not have a finite table."""
     sorts = {v.sort for formula in formulas for v in free_variables(formula)}
     parameters = {p for sort in sorts if isinstance(sort, FunctionSort) for p in sort.parameters}
     return any(isinstance(p, RealSort | IntegerSort | NaturalSort) for p in parameters)
 
 
 def _meets(values: Mapping[Variable, Value], formulas: Iterable[Term]) -> bool:
-    """Whether formulas hold of values that were found for another claim: then there is nothing to ask."""
+    """Whether formulas hold for values that were found for another claim: then no query is needed."""
     named = {variable.qualified: value for variable, value in values.items()}
     try:
         return len(named) == len(values) > 0 and all(_compiled(formula)(named) is True for formula in formulas)
@@ -460,5 +461,5 @@ def _meets(values: Mapping[Variable, Value], formulas: Iterable[Term]) -> bool:
 
 @by_identity(500)
 def _compiled(formula: Term) -> Evaluator:
-    """Raises NotEvaluable."""
+    """The formula as an evaluator. Raises NotEvaluable."""
     return compile_term(formula)

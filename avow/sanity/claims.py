@@ -1,7 +1,7 @@
-"""What is asked of a contract before anything is verified against it: the sanity claims of a node.
+"""The sanity claims of a node: what a contract has to satisfy before anything is verified against it.
 
 Every claim is named by the *good* thing that it states, so that `proved` is always good and `refuted`
-always bad: `not-vacuous-G1` claims that guarantee G1 is *not* vacuous. Nothing here asks a solver.
+always bad: `not-vacuous-G1` claims that guarantee G1 is *not* vacuous. Nothing here calls a solver.
 
 | property                 | the claim                                                                | severity |
 |--------------------------|--------------------------------------------------------------------------|----------|
@@ -14,8 +14,8 @@ always bad: `not-vacuous-G1` claims that guarantee G1 is *not* vacuous. Nothing 
 | not-redundant            | the guarantee (assumption) does not follow from the others               | warning  |
 | constrained              | the guarantees exclude some value of the output                          | warning  |
 | determined               | the inputs determine the output                                          | note     |
-| meetable                 | the providers of its inputs leave room for the assumption (asked of a    | error    |
-|                          | whole system: `avow.calculus.providers`)                                 |          |
+| meetable                 | the assumption is consistent with its providers' guarantees (a claim on  | error    |
+|                          | a whole system: `avow.calculus.providers`)                               |          |
 | needed                   | the assumption rules out inputs for which no output meets the guarantees | note     |
 """
 
@@ -63,14 +63,14 @@ _SEVERITY = {
 
 @dataclass(frozen=True, slots=True)
 class Claim:
-    """One claim about one node. `subject` is a clause's name or an output's, where the claim is about one."""
+    """One claim about one node. `subject` is the name of the clause or output that the claim is about, if any."""
 
     about: Property
     subject: str | None
     sentence: str
-    """The claim, for people."""
+    """The claim as a sentence."""
     formula: str
-    """The formula concerned, as people write it."""
+    """The formula concerned, in readable notation."""
     clauses: tuple[str, ...]
     """``node.clause`` names that the claim is about."""
     severity: Severity = Severity.ERROR
@@ -85,7 +85,7 @@ class Claim:
 
 @by_identity(20_000)
 def claims(node: Node) -> tuple[Claim, ...]:
-    """Every sanity claim of a node, in the order in which they are best read."""
+    """Every sanity claim of a node, in reading order."""
     assumed, guaranteed = _names(node, node.assumptions), _names(node, node.guarantees)
     a = show_term(conjunction(c.formula for c in node.assumptions))
     g = show_term(conjunction(c.formula for c in node.guarantees))
@@ -122,16 +122,16 @@ def claims(node: Node) -> tuple[Claim, ...]:
 
 @by_identity(20_000)
 def node_key(node: Node) -> str:
-    """SHA-256 of all that the answers depend on: clauses by name and meaning, ports by name and sort."""
-    clauses = sorted([str(c.kind), c.name, digest(c.formula)] for c in node.clauses)  # their order means nothing
+    """SHA-256 of everything that the answers depend on: clauses by name and meaning, ports by name and sort."""
+    clauses = sorted([str(c.kind), c.name, digest(c.formula)] for c in node.clauses)  # their order does not matter
     ports = [[p.variable.qualified, sort_digest(p.sort)] for p in (*node.inputs, *node.outputs)]
     return sha256(json.dumps([clauses, ports]))
 
 
 def triggers(formula: Term) -> tuple[Term, ...]:
-    """For each part of a guarantee that demands something only under a condition: that the condition can come about.
-    ``forall(x | P(x) -> (Q(x) -> R))`` gives ``exists(x | P(x) and Q(x))``, and so does whatever means the same
-    (`avow.formulas.conditions`). That a response does not come is no condition."""
+    """For each part of a guarantee that demands something only under a condition: the formula stating that the
+    condition can arise. ``forall(x | P(x) -> (Q(x) -> R))`` gives ``exists(x | P(x) and Q(x))``, and so does any
+    equivalent formula (`avow.formulas.conditions`). The absence of a response is not a condition."""
     found = dict.fromkeys(condition.formula for condition in conditions(formula))
     return tuple(f for f in found if not any(isinstance(t, History) and t.operator in RESPONSES for t in subterms(f)))
 
@@ -141,7 +141,7 @@ def _names(node: Node, clauses: tuple[Clause, ...]) -> tuple[str, ...]:
 
 
 def _of_clause(node: Node, clause: Clause) -> dict[Property, str]:
-    """What is asked of a clause, each as a sentence."""
+    """The claims about a clause, each as a sentence."""
     if clause.kind is ClauseKind.GUARANTEE:
         whose, others, out = f"Guarantee {clause.name} of {node.name}", node.guarantees, "something"
     else:
@@ -158,8 +158,8 @@ def _of_clause(node: Node, clause: Clause) -> dict[Property, str]:
 
 @dataclass(frozen=True, slots=True)
 class _NodeFacts:
-    """What follows from one node alone, whatever the system around it: its sanity claims, its digest, and of each
-    clause: the digest under the assumptions, that of the formula alone, and the formula for people."""
+    """The facts that depend on one node alone, not on its system: its sanity claims, its digest, and for each clause:
+    the digest under the assumptions, that of the formula alone, and the formula in readable notation."""
 
     claims: tuple[Claim, ...]
     key: str
@@ -176,7 +176,7 @@ def _facts(node: Node) -> _NodeFacts:
 
 
 def recall(contract: Contract, shelf: Shelf) -> None:
-    """Let the functions that ask for these facts know what was found in earlier runs."""
+    """Fill the caches of the functions for these facts with results of earlier runs."""
     for node in contract.nodes:
         if node.relay or not shelf.recall(_facts, node):
             continue

@@ -1,8 +1,8 @@
-"""Why a contract is not realizable: which guarantees conflict, where, and what each demands there.
+"""Why a contract is not realizable: the conflicting guarantees, the inputs, and what each guarantee demands there.
 
 A conflict is a set of guarantees that no output meets together at some allowed input, while every smaller set can be
-met at all of them. Avow looks for every one (`minimal_sets`) and says where the search was cut short. Of an input it
-shows what matters: the comparisons that make the conflict, and the inputs in them.
+met at all of them. Avow searches for every conflict (`minimal_sets`) and reports if the search was cut short. For an
+input it shows the relevant part: the comparisons that cause the conflict, and the inputs in them.
 """
 
 from __future__ import annotations
@@ -32,8 +32,8 @@ from avow.solving.z3_module import z3
 
 @dataclass(frozen=True, slots=True)
 class Conflict:
-    """A minimal set of guarantees that cannot all be met, with an input and what each demands there. `where` says of
-    which inputs this is true; None where that was not found out."""
+    """A minimal set of guarantees that cannot all be met, with an input and what each demands there. `where` describes
+    the inputs for which this is true; None if unknown."""
 
     clauses: tuple[str, ...]
     inputs: Given
@@ -56,8 +56,8 @@ def conflicts(
     effort: int = 4_000,
     seed: int = 0,
 ) -> tuple[tuple[Conflict, ...], bool]:
-    """The conflicts among guarantees, of which `answer` has one: its own group's first, then those of fewest clauses;
-    and whether these are all. The effort is for each group of guarantees that share outputs."""
+    """The conflicts among guarantees, given one in `answer`: first those of its group, and within a group those with
+    the fewest clauses; and whether these are all. The effort is for each group of guarantees that share outputs."""
     found: list[Conflict] = []
     complete = True
     for group in groups(guarantees, outputs):
@@ -78,7 +78,7 @@ def conflicts(
 
 @dataclass(slots=True)
 class _Search:
-    """One group's conflicts."""
+    """The search for one group's conflicts."""
 
     inputs: tuple[Variable, ...]
     group: Group
@@ -88,13 +88,13 @@ class _Search:
     shown: list[Given]
     """Allowed inputs for which no output meets all of the group."""
     refuted: dict[frozenset[str], Given] = field(default_factory=dict)
-    """Sets of guarantees that no output meets, and where."""
+    """Sets of guarantees → an allowed input at which no output meets them."""
 
     def ended(self) -> bool:
         return spent() > self.deadline
 
     def core(self, chosen: frozenset[str]) -> frozenset[str] | None:
-        """Of these guarantees some that no output meets at some allowed input; None if all can always be met."""
+        """A subset of these guarantees that no output meets at some allowed input; None if all can always be met."""
         for at in self.shown:
             if (core := self._core_at(at, chosen)) is not None:
                 return core
@@ -160,8 +160,8 @@ def contradictions(
 def _region(
     inputs: Sequence[Variable], wanted: Formulas, at: Given, seed: int
 ) -> tuple[tuple[Term, ...] | None, frozenset[Variable]]:
-    """Comparisons of the formulas, true at this input, wherever which no output meets them; and the inputs that these
-    speak of, with those whose very value it takes."""
+    """Comparisons in the formulas that are true at this input, such that no output meets the formulas wherever they
+    hold (None if unknown); and the inputs that they mention or whose exact values are needed."""
     known = [v for v in inputs if v in at]
     found = (_reading(atom, at) for atom in _about(wanted.values(), known))
     readings: list[Term] = list(dict.fromkeys(reading for reading in found if reading is not None))
@@ -185,7 +185,7 @@ def _region(
 
 
 def _about(formulas: Iterable[Term], inputs: Sequence[Variable]) -> list[Term]:
-    """The comparisons in the formulas that speak of inputs only."""
+    """The comparisons in the formulas that mention only inputs."""
     found = (
         part
         for formula in formulas
@@ -196,7 +196,7 @@ def _about(formulas: Iterable[Term], inputs: Sequence[Variable]) -> list[Term]:
 
 
 def _reading(atom: Term, at: Given) -> Term | None:
-    """The comparison, or what holds in its place, as it is true at this input; None where it has no value there."""
+    """The comparison or its negation, whichever is true at this input; None if it has no value there."""
     if replay((atom,), at, effort=CONFLICT_EFFORT) is True:
         return atom
     match atom:
@@ -208,7 +208,7 @@ def _reading(atom: Term, at: Given) -> Term | None:
 
 
 def _demand(formula: Term, outputs: Sequence[Variable], at: Mapping[Variable, Value], seed: int) -> str:
-    """What a guarantee asks for at this input, in the contract's words."""
+    """What a guarantee demands at this input, in the contract's terms."""
     mentioned = [output for output in outputs if output in free_variables(formula)]
     answer = solve([formula], given=at, variables=mentioned, effort=CONFLICT_EFFORT, seed=seed)
     if answer.status == "unsat":
@@ -225,7 +225,7 @@ def _demand(formula: Term, outputs: Sequence[Variable], at: Mapping[Variable, Va
 
 
 def _shown(formula: Term, output: Variable, value: Value, at: Mapping[Variable, Value], seed: int) -> str:
-    """The value if no other is allowed, its constructor if no other is, else nothing."""
+    """The value if no other is allowed, its constructor if no other is, otherwise empty."""
     if isinstance(output.sort, FunctionSort):
         return ""
     other = Variable(Role.INPUT, "the value shown", output.sort)
@@ -246,12 +246,12 @@ def _shown(formula: Term, output: Variable, value: Value, at: Mapping[Variable, 
 
 
 class UndecidedError(Exception):
-    """Whether a set has the property was not found out."""
+    """It is undecided whether a set has the property."""
 
 
 @dataclass(frozen=True, slots=True)
 class _MinimalSets:
-    """The sets, smallest first, and whether there are no others and none of them could be smaller."""
+    """The sets, smallest first, and whether they are certainly all sets and minimal."""
 
     sets: tuple[frozenset[str], ...]
     complete: bool
@@ -264,12 +264,12 @@ def minimal_sets(
     most: int,
     ended: Callable[[], bool],
 ) -> _MinimalSets:
-    """All minimal sets of labels that have a property which every larger set has too. Seeds are maximal sets of which
-    nothing is known; one with the property is made smaller to a minimal set, one without it settles all its subsets
-    (Liffiton, Previti, Malik and Marques-Silva, "Fast, flexible MUS enumeration", 2016).
+    """All minimal sets of labels with a monotone property (every superset also has it). Seeds are maximal sets of
+    unknown status; one with the property is shrunk to a minimal set, one without it decides all its subsets (Liffiton,
+    Previti, Malik and Marques-Silva, "Fast, flexible MUS enumeration", 2016).
 
-    `core` says of a set which of its subsets it found to have the property, or None where it has not; it raises
-    `UndecidedError`. At most so many sets are looked for, until `ended`.
+    `core` returns a subset of a set that has the property, or None if the set does not have it; it raises
+    `UndecidedError`. The search stops after `most` sets, or when `ended`.
     """
     known = _Known(labels)
     found: list[frozenset[str]] = []
@@ -305,7 +305,7 @@ def minimal_sets(
 
 
 class _Known:
-    """The sets about which something is known, as clauses over a Boolean for each label."""
+    """The sets of known status, as clauses over a Boolean for each label."""
 
     def __init__(self, labels: Sequence[str]) -> None:
         context = Translator().context
@@ -313,7 +313,7 @@ class _Known:
         self._chosen = {label: z3.Bool(f"{k}", context) for k, label in enumerate(labels)}
 
     def seed(self) -> frozenset[str] | None:
-        """A set of which nothing is known though something is of every larger one; None if there is none."""
+        """A maximal set of unknown status; None if there is none."""
         seed: set[str] = set()
         if self._solver.check() != z3.sat:
             return None
@@ -334,7 +334,7 @@ class _Known:
         self._solver.add(z3.Or([z3.Not(self._chosen[label]) for label in labels] or [self._false()]))
 
     def without(self, labels: Collection[str]) -> None:
-        """This set alone is not asked about again."""
+        """Exclude only this set from further seeds."""
         self._solver.add(z3.Or([z3.Not(v) if label in labels else v for label, v in self._chosen.items()]))
 
     def _false(self) -> object:

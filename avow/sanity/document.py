@@ -1,4 +1,4 @@
-"""What ``avow sanity --json`` writes: docs/schemas/sanity.schema.json follows from it."""
+"""The output of ``avow sanity --json``; docs/schemas/sanity.schema.json is generated from it."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ class SanityDocument:
 
 
 def told(result: SanityResult) -> Result:
-    """One result, for machines."""
+    """The document for one result."""
     asked, shown, span = result.asked, result.counterexample, result.asked.span
     conflicts = tuple(Conflict(clauses, _shown(example)) for clauses, example in result.conflicts)
     return Result(

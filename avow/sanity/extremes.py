@@ -1,8 +1,8 @@
-"""The least and the greatest that a finite part of a sequence has: what witnesses of "the minimum of the scan" are.
+"""The least and the greatest element of a finite part of a sequence: witnesses for "the minimum of the scan".
 
-Of the positions that meet a guard with an upper bound there are finitely many. If there is one then there is one at
-which a number is least (greatest), and of these a first one. No first-order term says which; a constant with this as
-its axiom does, and with it the rest is about universally quantified positions only, which solvers decide.
+Only finitely many positions satisfy a guard with an upper bound. If there is one, then there is one at which a number
+is least (greatest), and a first such position. No first-order term denotes it, but a constant with this property as its
+axiom does; the remaining formulas then quantify positions only universally, which solvers decide.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from avow.language.subterms import subterms
 
 @dataclass(frozen=True, slots=True)
 class Extreme:
-    """`constant` is the first (last) of the positions that meet the guard at which `measure` is least (greatest)."""
+    """`constant` is the first (last) of the positions that satisfy the guard at which `measure` is least (greatest)."""
 
     constant: t.Variable
     position: t.Variable
@@ -28,7 +28,7 @@ class Extreme:
     last: bool
 
     def axiom(self) -> t.Term:
-        """That it is, if some position meets the guard."""
+        """The axiom that defines the constant, if some position satisfies the guard."""
         at = {self.position: self.constant}
         here = substitute(self.measure, at)
         low, high = (self.measure, here) if self.greatest else (here, self.measure)
@@ -43,8 +43,8 @@ class Extreme:
         )
 
     def exists(self, taken: Set[t.Variable]) -> bool:
-        """Whether there is such a position, whatever the inputs: it is chosen after what is `taken`, and finitely many
-        positions are to be chosen from."""
+        """Whether there is such a position for all inputs: the constant is new (not in `taken`), and the candidate
+        positions are finitely many."""
         known = taken | free_variables(self.guard) | free_variables(self.measure)
         return (
             self.constant.sort == NATURAL
@@ -56,7 +56,7 @@ class Extreme:
 
 
 def bounded(position: t.Variable, guard: t.Term) -> bool:
-    """Whether finitely many natural numbers at most meet a guard, by one of its parts."""
+    """Whether one part of a guard shows that only finitely many natural numbers satisfy it."""
     if position.sort != NATURAL:
         return False
     match guard:
@@ -74,13 +74,13 @@ def bounded(position: t.Variable, guard: t.Term) -> bool:
             return left == position and position not in free_variables(bound)
         case t.In(item=item, collection=t.SequenceRange() | t.SequenceTerm() as collection):
             return item == position and position not in free_variables(collection)
-        case _:  # it may be so all the same
+        case _:  # it may be bounded nevertheless
             return False
 
 
 def measures(position: t.Variable, demand: t.Term, outputs: Set[t.Variable]) -> Iterator[tuple[t.Term, bool, bool]]:
-    """The numbers at a position with which a demand, whose negations are pushed in, compares an output, whether the
-    greatest one is decisive, and whether the last one is: a guess, which only suggests."""
+    """The numbers at a position with which a demand (in negation normal form) compares an output, whether the greatest
+    one is decisive, and whether the last one is: a heuristic that only makes suggestions."""
     parts = list(subterms(demand))
     denied = {part.body for part in parts if isinstance(part, t.Not)}
     found: list[tuple[t.Term, bool]] = []
@@ -90,7 +90,7 @@ def measures(position: t.Variable, demand: t.Term, outputs: Set[t.Variable]) -> 
                 if free_variables(atom) & outputs:
                     less = (operator[0] == "<") != (atom in denied)
                     found += [*_numbers(position, left, outputs, less), *_numbers(position, right, outputs, not less)]
-            case _:  # no order: no extreme decides
+            case _:  # no ordering: no extreme is decisive
                 continue
     last = (position, True) in found
     yield from ((measure, greatest, last) for measure, greatest in dict.fromkeys(found))
@@ -99,7 +99,7 @@ def measures(position: t.Variable, demand: t.Term, outputs: Set[t.Variable]) -> 
 def _numbers(
     position: t.Variable, side: t.Term, outputs: Set[t.Variable], greatest: bool
 ) -> Iterator[tuple[t.Term, bool]]:
-    """The largest terms in one that are numbers, know the position and no output."""
+    """The largest numeric subterms that mention the position and no output."""
     known = free_variables(side)
     if position not in known:
         return

@@ -1,13 +1,12 @@
-"""Mutants of a formula: near misses of what a contract says, to see whether the evidence for it would notice.
+"""Mutants of a formula: small changes to a clause that show whether the evidence for it would detect them.
 
-A method that supports a guarantee and would support its mutants as well says nothing of the guarantee: its evidence is
-hollow. Mutants that follow from the original (a weaker claim) are no test of that, and are left out by `telling`.
+The evidence of a method that supports a guarantee and would also support its mutants is non-discriminating. Mutants
+that follow from the original (a weaker claim) do not test this, and `telling` leaves them out.
 
-`difference` says what would tell a survivor from the guarantee. Two cases differ in what is to be done about them. At
-some input, *every* answer that the contract allows may break the mutant: a program that keeps the contract breaks it
-there, so a method that accepts the mutant has not looked there. Or the contract allows an answer that the mutant
-forbids, and others too: then only a program that gives that answer shows the difference, and the method need not be to
-blame.
+`difference` shows what distinguishes a surviving mutant from the guarantee. There are two cases. At some input, *every*
+output that the contract allows may violate the mutant: a program that keeps the contract violates it there, so a method
+that accepts the mutant has not examined that input. Or the contract allows an output that the mutant forbids, and
+others too: then only a program with that output shows the difference, and the method may be blameless.
 """
 
 from __future__ import annotations
@@ -36,14 +35,15 @@ _FLIPPED = {"<": "<=", "<=": "<", ">": ">=", ">=": ">", "==": "!=", "!=": "=="}
 
 @dataclass(frozen=True, slots=True)
 class Mutant:
-    """`change` says in words what was done; `formula` is the whole formula, changed in one place."""
+    """`change` describes the change; `formula` is the whole formula, changed in one place."""
 
     change: str
     formula: t.Term
 
 
 def mutants(formula: t.Term) -> tuple[Mutant, ...]:
-    """Every mutant of a formula, in reading order, each meaning once, the original's meaning not at all."""
+    """Every mutant of a formula, in reading order, without duplicates or equivalents of the original (after
+    normalisation)."""
     seen = {normalise(formula)}
     found = []
     changed = (Mutant("the whole is negated", _negated(formula)), *_everywhere(formula))
@@ -60,7 +60,7 @@ def telling(
     formula: t.Term, assumptions: tuple[t.Term, ...], limit: int, effort: int = 2_000, others: tuple[t.Term, ...] = ()
 ) -> tuple[Mutant, ...]:
     """Up to `limit` mutants that do not follow from the original under the assumptions, spread over the formula; nor
-    from it and the `others`, the node's further guarantees: what keeps the contract keeps such a mutant."""
+    from it and the `others`, the node's further guarantees: programs that keep the contract keep such a mutant."""
     kept = [
         m
         for m in mutants(formula)
@@ -84,7 +84,7 @@ def _negated(formula: t.Term) -> t.Term:
 
 
 def _everywhere(formula: t.Term) -> Iterator[Mutant]:
-    """Mutants made at each place, by an explicit stack: formulas may be deep."""
+    """Mutants at each place, with an explicit stack: formulas may be deep."""
     stack: list[tuple[t.Term, Callable[[t.Term], t.Term]]] = [(formula, lambda item: item)]
     while stack:
         term, put = stack.pop()
@@ -92,7 +92,7 @@ def _everywhere(formula: t.Term) -> Iterator[Mutant]:
             yield Mutant(change, put(new))
         parts = term.children
         if isinstance(term, t.Operation) and term.operator in (t.Builtin.MOD, t.Builtin.DIV):
-            stack.append((parts[0], _at(term, parts, 0, put)))  # its divisor stays positive
+            stack.append((parts[0], _at(term, parts, 0, put)))  # the divisor must stay positive
             continue
         for place in reversed(range(len(parts))):
             stack.append((parts[place], _at(term, parts, place, put)))
@@ -142,9 +142,9 @@ def _here(term: t.Term) -> Iterator[tuple[str, t.Term]]:
                 "the branches of an `if` change places",
                 t.Conditional(condition, otherwise, then, term.sort, term.span),
             )
-        case t.Implies(right=right):  # notices a conclusion that a table maps to what always holds
+        case t.Implies(right=right):  # detects a conclusion that a table maps to something always true
             yield "a condition is dropped", right
-        case _:  # no near miss of its own: its parts have some
+        case _:  # no mutant of its own, only of its parts
             return
 
 
@@ -157,8 +157,8 @@ def _literal(value: int | Fraction, old: t.Literal) -> t.Term:
 @dataclass(frozen=True, slots=True)
 class Difference:
     """`formula` is the mutant. `at` is an input and `answer` an output that the contract allows there and the mutant
-    does not, in the contract's words; with `forced`, every output that it allows there is such a one. Both are empty
-    where none was found in time."""
+    does not, in the contract's terms; with `forced`, this is so for every output that the contract allows there. Both
+    are empty if none was found in time."""
 
     change: str
     formula: str
@@ -168,7 +168,7 @@ class Difference:
 
     @property
     def why(self) -> str:
-        """One sentence: where the two differ, and what would see it."""
+        """One sentence: where the two differ, and what would show it."""
         if not self.at and not self.answer:
             return "where the two differ was not found in time"
         if self.forced:
@@ -180,8 +180,8 @@ class Difference:
 
 @new_session()
 def difference(node: Node, mutant: Mutant, effort: int = 4_000) -> Difference:
-    """What distinguishes the mutant of one of the node's guarantees from the node's contract; at most so much
-    effort for each of two questions."""
+    """The difference between a mutant of one of the node's guarantees and the node's contract; `effort` limits each of
+    two queries."""
     told = Difference(mutant.change, show_term(mutant.formula))
     assumptions = {f"assumed {c.name}": c.formula for c in node.assumptions}
     guarantees = {c.name: c.formula for c in node.guarantees}
@@ -191,7 +191,7 @@ def difference(node: Node, mutant: Mutant, effort: int = 4_000) -> Difference:
     kept = realizable(inputs, outputs, assumptions, wanted, effort=effort, doubtful=True)
     if kept.verdict is Verdict.REFUTED:
         found = solve(guarantees, given=kept.inputs, variables=outputs, effort=effort)
-        if found.status == "sat":  # else the contract itself has no answer there, and shows no difference
+        if found.status == "sat":  # otherwise the contract has no output there, so no difference
             concerned = [formula for name, formula in guarantees.items() if name in kept.group]
             return _shown(told, {**kept.inputs, **found.values}, [mutant.formula, *concerned], forced=True)
     answer = entails({**assumptions, **guarantees}, mutant.formula, effort=effort)
@@ -201,7 +201,7 @@ def difference(node: Node, mutant: Mutant, effort: int = 4_000) -> Difference:
 def _shown(
     told: Difference, values: Mapping[t.Variable, Value], formulas: list[t.Term], forced: bool = False
 ) -> Difference:
-    """With the inputs of which the formulas speak, and the outputs of which the mutant (the first of them) does."""
+    """The difference with the inputs that the formulas mention, and the outputs that the mutant (the first) does."""
     inputs = frozenset[t.Variable]().union(*map(free_variables, formulas))
     outputs = free_variables(formulas[0])
 

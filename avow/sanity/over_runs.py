@@ -1,7 +1,7 @@
-"""The sanity claims of a node whose clauses have memory: asked of what runs can reach, not of any memory at all.
+"""The sanity claims of a node whose clauses have state variables: about states that runs can reach, not all states.
 
-A run reaches a memory by steps at which all assumptions and guarantees hold. What holds of no memory at all holds of
-none that is reached; what is possible is shown at the end of a run from its first step.
+A run reaches a state by steps at which all assumptions and guarantees hold. A formula that holds in no state holds in
+no reached state; a possibility is shown at the end of a run from the first step.
 """
 
 from __future__ import annotations
@@ -30,33 +30,33 @@ _TRIGGER = "trigger"
 
 
 STEPS_OF_INDUCTION = 2
-"""A condition that is false at so many steps, one after another, is asked to be false at the next."""
+"""The number of consecutive steps at which a condition is false before it has to be false at the next."""
 
 
 @dataclass(slots=True)
 class OverRuns:
-    """One node; its claims share what was found of its memory."""
+    """One node; its claims share the results about its states."""
 
     node: Node
     patience: Patience
     seed: int = 0
     serious: bool = True
-    """Whether the claim that is being settled is one of severity error."""
+    """Whether the current claim has severity error."""
     remembering: Remembering = field(init=False)
     _viable: Viability | None = None
     _empty: bool | None = None
     _ends: dict[int, bool] = field(default_factory=dict)
     _written: list[Mapping[str, Term]] = field(default_factory=list)
-    """What holds before the first step of a run, then what each step adds: the contract is kept, memories move on."""
+    """The facts before the first step of a run, then those of each step: the contract is kept, cells are updated."""
 
     @property
     def limit(self) -> int:
-        """Effort for a question of this claim: less, the more went into claims that stayed open."""
+        """Effort for one query of this claim: the more went into claims that stayed open, the less."""
         return self.patience.effort(self.serious)
 
     def __post_init__(self) -> None:
         asked = tuple(
-            replace(clause, name=f"{clause.name} {_TRIGGER}", formula=negation(trigger))  # which is so at no position
+            replace(clause, name=f"{clause.name} {_TRIGGER}", formula=negation(trigger))  # false at every position
             for clause in self.node.guarantees
             for trigger in triggers(clause.formula)
         )
@@ -79,7 +79,7 @@ class OverRuns:
         return replace(found, because="assumptions-satisfiable") if failed else found
 
     def _impossible(self, found: Finding) -> bool:
-        """Whether a claim is only false because no run is allowed at all."""
+        """Whether a claim is false only because no run is allowed at all."""
         if found.verdict is not Verdict.REFUTED:
             return False
         if self._empty is None:
@@ -154,7 +154,7 @@ class OverRuns:
         return Finding(found.verdict, found.reason)
 
     def _alone(self, claim: Claim) -> OverRuns:
-        """The node with the clauses that the claim is about: the others would keep runs from what is asked for."""
+        """The node with the clauses that the claim is about: the others would exclude runs that the claim needs."""
         clause = self.node.clause(claim.subject or "")
         if clause.kind is ClauseKind.GUARANTEE:
             whole = claim.about is Property.NOT_REDUNDANT
@@ -211,7 +211,8 @@ class OverRuns:
         return Finding(found.verdict, text)
 
     def _determined(self, name: str) -> Finding:
-        """Two answers at one step of a run. Where an output is remembered, one of them may be no answer in the end."""
+        """Two outputs at one step of a run. If a cell depends on an output, one of them may turn out to be impossible
+        later."""
         output = self.node.output(name).variable
         again = {
             v: Variable(Role.OUTPUT, f"{v.name} (another)", v.sort) for v in (p.variable for p in self.node.outputs)
@@ -228,7 +229,7 @@ class OverRuns:
         if found.verdict is not Verdict.PROVED:
             return found
         remembered = any(v.role is Role.OUTPUT for cell in self.remembering.cells for v in free_variables(cell.now))
-        lost = remembered and self.viability.verdict is Verdict.REFUTED  # then nobody can go on for ever after either
+        lost = remembered and self.viability.verdict is Verdict.REFUTED  # then no run continues for ever after either
         if remembered and not lost:
             if (lasting := self.viability.lasting) is not None:  # known after both values
                 after = substitute(lasting, {cell.before: cell.now for cell in self.remembering.cells})
@@ -255,11 +256,11 @@ class OverRuns:
                 return Finding(Verdict.PROVED)
             case Verdict.PROVED:
                 return Finding(Verdict.REFUTED, "every guarantee can be kept without it", (name,))
-            case _:  # no answer
+            case _:  # undecided
                 return Finding(Verdict.UNKNOWN, "whether the guarantees could be kept without it is open")
 
     def _possible(self, formulas: Mapping[str, Term], excluded: str) -> Finding:
-        """Can they hold together at some step of a run at whose earlier steps the contract was kept?"""
+        """Can the formulas hold together at some step of a run whose earlier steps kept the contract?"""
         anywhere = solve(formulas, effort=self.limit, seed=self.seed, values="unused")
         if anywhere.status == "unsat":
             if doubted(anywhere, formulas):
@@ -296,8 +297,8 @@ class OverRuns:
         return Finding(Verdict.UNKNOWN, open_still)
 
     def never_met(self, name: str) -> bool:
-        """Whether it is shown that some condition of a guarantee comes about at no step of any run: it is false at the
-        first steps, and by induction at every later one."""
+        """Whether it is shown that some condition of a guarantee arises at no step of any run: it is false at the first
+        steps, and by induction at every later one."""
         asked = [negation(c.formula) for c in self.remembering.node.guarantees if c.name == f"{name} {_TRIGGER}"]
         return any(self._never({**self.assumptions, "its trigger": trigger}) for trigger in asked)
 
@@ -317,8 +318,8 @@ class OverRuns:
         return answer.status == "unsat" and not doubted(answer, facts)
 
     def _run(self, length: int) -> Mapping[str, Term]:
-        """That a run of so many steps keeps the contract, and what it leaves. Each step is written once, so that it is
-        translated once for all questions."""
+        """The facts that a run of so many steps keeps the contract, and its cells. Each step is built once, so that it
+        is translated once for all queries."""
         if not self._written:
             self._written.append({f"first {c.name}": self._at(c.begins(), 0) for c in self.remembering.cells})
         kept = conjunction((*self.assumptions.values(), *self.guarantees.values()))

@@ -1,20 +1,20 @@
-"""That a contract is realizable, and that it is not, is said only after a separate question.
+"""Confirms by a separate query that a contract is realizable, or that it is not, before this is reported.
 
-A search hands over what it found: alternatives for the outputs (`Proof`), or values of the inputs. Nothing that the
-search concluded is taken from it. Of a proof it is checked
+A search returns alternatives for the outputs (`Proof`), or values of the inputs. Its conclusions are not trusted. For a
+proof the following is checked:
 
-- that the constants in the alternatives exist whatever the inputs: each axiom only names what there is (Hilbert's
-  epsilon, the least natural number, the integer part, the best of finitely many positions), of a constant that nothing
+- that the constants in the alternatives exist for all inputs: each axiom only names something that exists (Hilbert's
+  epsilon, the least natural number, the integer part, the best of finitely many positions), by a constant that nothing
   before it mentions;
-- that the contract's own assumptions exclude that every alternative fails what was shown: a fresh question to the
-  solver. An alternative's terms are put into the formulas first; a function, or a value that was found, has its meaning
-  in the question. `unsat` says so for every result that operations may have outside their domains;
-- that what was shown implies the contract's own guarantees, where it is said in other words: with instances for
-  `exists`, with items for tuples, lengths and functions for sequences, or of one point of a function in the place of
-  all; and that the contract's assumptions imply the changed ones.
+- that the contract's own assumptions exclude that every alternative violates what was shown, by a new solver query. An
+  alternative's terms are first substituted into the formulas; a function, or a found value, has its meaning in the
+  query. `unsat` then holds for every result that operations may have outside their domains;
+- that what was shown implies the contract's own guarantees, if it was transformed: with instances for `exists`, items
+  for tuples, lengths and functions for sequences, or one point of a function for all; and that the contract's
+  assumptions imply the transformed ones.
 
-Without alternatives, what was shown is that no assumption lets every output fail: that question is asked again. Of a
-refutation the assumptions are evaluated at the inputs, and no output may meet the guarantees with these as constants.
+A proof without alternatives claims that some output is possible for all allowed inputs: that query is made again. For a
+refutation, the assumptions are evaluated at the inputs, and no output may meet the guarantees with these as constants.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ def confirmed(
     effort: int,
     seed: int = 0,
 ) -> bool:
-    """Whether the proofs together, each about outputs of its own, show that some output meets all guarantees."""
+    """Whether the proofs together, each about its own outputs, show that some output meets all guarantees."""
     labels = [label for proof in proofs for label in proof.shown]
     outputs = [output for proof in proofs for output in proof.outputs]
     if set(labels) != set(guarantees) or len(set(labels)) < len(labels) or len(set(outputs)) < len(outputs):
@@ -100,8 +100,8 @@ def refutes(
 
 
 def implied(stronger: Formulas, weaker: Formulas, *, effort: int, seed: int = 0) -> bool:
-    """Whether it is proved that each formula implies the one with the same label: what was shown, or assumed, in other
-    words was that."""
+    """Whether it is proved that each formula implies the one with the same label: the transformed formulas serve for
+    the original ones."""
     pairs = [(stronger[label], formula) for label, formula in weaker.items() if label in stronger]
     return all(one == other or _implies(one, other, effort, seed) for one, other in pairs)
 
@@ -115,7 +115,7 @@ def _implies(one: t.Term, other: t.Term, effort: int, seed: int) -> bool:
 
 
 def _is_instance(one: t.Term, other: t.Term) -> bool:
-    """Whether a formula is another with some values in the place of what there `exists`: then it implies it."""
+    """Whether a formula is another with values for its `exists` variables: then it implies it."""
     match one, other:
         case (t.And(items=ones), t.And(items=others)) | (t.Or(items=ones), t.Or(items=others)) if len(ones) == len(
             others
@@ -132,7 +132,7 @@ def _is_instance(one: t.Term, other: t.Term) -> bool:
                 for parts in ((one,), one.items if isinstance(one, t.Or) else ())
                 if parts
             )
-        case _:  # nothing is put in any place
+        case _:  # no instance
             return one == other
 
 
@@ -144,7 +144,7 @@ def _is_one_of(one: t.Term, variables: tuple[t.Variable, ...], body: t.Term) -> 
 
 
 def _align(one: t.Term, body: t.Term, variables: set[t.Variable], values: dict[t.Variable, t.Term]) -> None:
-    """What stands in a term where another has these variables; a guess, to be tried."""
+    """The subterms of a term at the positions of another's variables; a guess, to be checked."""
     if isinstance(body, t.Variable) and body in variables:
         values.setdefault(body, one)
     elif type(one) is type(body) and len(one.children) == len(body.children):
@@ -153,7 +153,7 @@ def _align(one: t.Term, body: t.Term, variables: set[t.Variable], values: dict[t
 
 
 def _met(proof: Proof, assumptions: Formulas, given: Mapping[t.Variable, Value], effort: int, seed: int) -> bool:
-    """No allowed input, and constants as the axioms have them, at which every alternative fails."""
+    """Whether there is no allowed input, with constants that satisfy the axioms, at which every alternative fails."""
     shown = tuple(proof.shown.values())
     if not proof.alternatives:
         bound = {v: t.Variable(t.Role.BOUND, f"some {v.name}", v.sort) for v in proof.outputs}
@@ -164,10 +164,10 @@ def _met(proof: Proof, assumptions: Formulas, given: Mapping[t.Variable, Value],
         return solve(formulas, effort=effort, seed=seed, given=given, variables=proof.inputs).status == "unsat"
     translator = Translator()
     fixed: dict[t.Variable, Meaning] = {v: translator.value(value, v.sort) for v, value in given.items()}
-    # what is given says which elements an unspecified sort has; a value that the search has met does not
+    # given values determine the elements of an unspecified sort; values that the search found do not
     facts = [*translator.opaque_facts(), *(translator.term(formula, fixed) for formula in proof.axioms)]
     facts += [z3.Not(_meets(translator, shown, alternative, fixed)) for alternative in proof.alternatives]
-    # an output that an alternative leaves out may be anything
+    # an output that an alternative leaves out may have any value
     free = {v for formula in (*assumptions.values(), *shown) for v in free_variables(formula)}
     free -= {v for v in proof.outputs if all(v in alternative for alternative in proof.alternatives)}
     named = dict.fromkeys((*proof.inputs, *proof.constants.constants))
@@ -200,7 +200,7 @@ def _widened(value: object, output: t.Variable) -> t.Term:
 
 
 def _conservative(proof: Proof, given: Mapping[t.Variable, Value]) -> bool:
-    """Whether suitable constants exist, whatever the inputs: each axiom speaks of constants that are new with it."""
+    """Whether suitable constants exist for all inputs: each axiom introduces new constants."""
     found = proof.constants
     taken = {*proof.inputs, *proof.outputs, *given}
     if any(constant.role is not t.Role.BOUND or constant in taken for constant in found.constants):
@@ -240,7 +240,7 @@ def _conservative(proof: Proof, given: Mapping[t.Variable, Value]) -> bool:
                 if axiom != between or whole.sort != INTEGER or whole in seen | free_variables(ground):
                     return False
                 new = {whole}
-            case _:  # it says something that need not be so
+            case _:  # an axiom that need not be satisfiable
                 return False
         if not new <= set(found.constants) or free_variables(axiom) & set(proof.outputs):
             return False

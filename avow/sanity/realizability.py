@@ -1,13 +1,13 @@
 """Is a contract realizable: for all inputs that it allows, is there an output that meets every guarantee?
 
-Three ways are tried, in short rounds first, and each answer is sound by itself:
-- the question as it stands, given to the solver (where no output is a function);
+Three methods are tried, first in short rounds, and each answer is sound by itself:
+- the question itself, given to the solver (if no output is a function);
 - witnesses (`avow.sanity.witnesses`): if no allowed input defeats them all, the contract is realizable;
 - a search for an input that defeats them all, which counts only when the solver shows, with the input's values put in,
   that *no* output meets the guarantees there; an output found instead becomes another witness, and the search goes on.
 
-Guarantees that share no output are asked about apart: each group is realizable or the contract is not. Sequences are
-taken for functions, tuples for their items, and functions for their values at a point, where that says the same.
+Guarantees that share no output are checked separately: the contract is realizable only if each group is. Sequences are
+replaced by functions, tuples by their items, and functions by their values at a point, if that is equivalent.
 """
 
 from __future__ import annotations
@@ -32,9 +32,9 @@ from avow.solving.translation import same_session
 
 @dataclass(frozen=True, slots=True)
 class Question:
-    """Is there, for all `inputs` that meet the assumptions, an output that meets the guarantees? `given` fixes some
-    inputs (a scenario): the answer is then about these only. `doubtful`: there likely is not, and inputs without an
-    output are looked for first."""
+    """Is there, for all `inputs` that satisfy the assumptions, an output that meets the guarantees? `given` fixes some
+    inputs (a scenario): the answer is then about these only. `doubtful`: probably not, so inputs without an output are
+    searched for first."""
 
     inputs: tuple[Variable, ...]
     outputs: tuple[Variable, ...]
@@ -65,7 +65,7 @@ def realizable(
     seed: int = 0,
     doubtful: bool = False,
 ) -> Realizability:
-    """Decide it: see `Question`."""
+    """Decides the `Question`."""
     asked = Question(tuple(inputs), tuple(outputs), assumptions, guarantees, given or {}, effort, seed, doubtful)
     end = spent() + effort
     with budget(effort * REALIZABLE_SHARE):
@@ -78,8 +78,8 @@ def realizable(
 
 
 def possible(formulas: Formulas, *, effort: int, seed: int = 0) -> bool:
-    """Whether formulas hold together for some values: as the question whether some output meets them, where there are
-    no inputs. It helps where functions are wanted that are no tables, such as ``f(x) = x``. False proves nothing."""
+    """Whether formulas hold together for some values: as the question whether some output meets them, without inputs.
+    This helps if functions without a finite table are needed, such as ``f(x) = x``. False proves nothing."""
     wanted = sorted(frozenset().union(*map(free_variables, formulas.values())), key=lambda v: v.qualified)
     return realizable((), wanted, {}, formulas, effort=effort, seed=seed).verdict is Verdict.PROVED
 
@@ -103,7 +103,7 @@ def _grouped(asked: Question) -> Realizability:
 
 
 def _searched(asked: Question, group: Group, effort: int) -> Realizability:
-    """What the search says of a group, if a question of its own confirms it."""
+    """The search's answer for a group, if a separate query confirms it."""
     answer = asked.search(group, effort).decide(asked.doubtful)
     limit = max(CONFIRMING_EFFORT, effort)
     match answer.verdict:
@@ -113,7 +113,7 @@ def _searched(asked: Question, group: Group, effort: int) -> Realizability:
             )
         case Verdict.REFUTED:
             good = _refutes(asked, group, answer.inputs, limit)
-        case _:  # nothing is claimed
+        case _:  # undecided: nothing to confirm
             return answer
     return answer if good else Realizability(Verdict.UNKNOWN, reason=_UNCONFIRMED, engine=answer.engine)
 
@@ -124,7 +124,7 @@ def _refutes(asked: Question, group: Group, inputs: Given, limit: int) -> bool:
 
 
 def _same(asked: Question, assumptions: Formulas, guarantees: Formulas) -> bool:
-    """Whether what was shown with these formulas was shown of the question."""
+    """Whether a proof for these formulas is a proof for the question."""
     limit = max(CONFIRMING_EFFORT, asked.effort)
     return implied(guarantees, asked.guarantees, effort=limit, seed=asked.seed) and implied(
         asked.assumptions, assumptions, effort=limit, seed=asked.seed
@@ -135,7 +135,7 @@ _UNCONFIRMED = "an answer was found, but a separate question does not confirm it
 
 
 def _at_a_point(asked: Question, group: Group) -> Realizability | None:
-    """Decide one group with values in the place of functions; None if that is not possible, or not decided."""
+    """Decide one group with values in place of functions; None if that is not possible, or not decided."""
     there = pointwise(group.guarantees, group.outputs)
     if there is None:
         return None
@@ -161,7 +161,7 @@ def _at_a_point(asked: Question, group: Group) -> Realizability | None:
 
 
 def _with_items(asked: Question) -> Realizability | None:
-    """Decide it with its items in the place of each tuple; None if there are none, or that does not help."""
+    """Decide the question with each tuple replaced by its items; None if there are none, or that does not help."""
     formulas = {(True, label): formula for label, formula in asked.assumptions.items()}
     formulas |= {(False, label): formula for label, formula in asked.guarantees.items()}
     apart = untupled(formulas, [v for v in (*asked.inputs, *asked.outputs) if v not in asked.given])
@@ -196,10 +196,10 @@ def _with_items(asked: Question) -> Realizability | None:
 
 
 def _with_functions(asked: Question) -> Realizability | None:
-    """Decide it with functions in the place of sequences; None if that is not possible, or does not help.
+    """Decide the question with functions in place of sequences; None if that is not possible, or does not help.
 
-    An output counts only if no element outside it matters. An input without such an output is then asked about as it
-    stands: some other output may do there.
+    An output counts only if elements beyond its length do not matter. An input without such an output is then checked
+    in the original question: another output may exist there.
     """
     inputs, outputs = asked.inputs, asked.outputs
     sequences = [v for v in (*inputs, *outputs) if isinstance(v.sort, SequenceSort) and v not in asked.given]
@@ -233,7 +233,7 @@ def _with_functions(asked: Question) -> Realizability | None:
 
 
 def _halves(formulas: Mapping[tuple[bool, str], Term]) -> tuple[dict[str, Term], dict[str, Term]]:
-    """Assumptions and guarantees, put together for a change."""
+    """Splits formulas that were transformed together into assumptions and guarantees."""
     assumed, wanted = (
         {label: formula for (kind, label), formula in formulas.items() if kind is which} for which in (True, False)
     )

@@ -16,8 +16,8 @@ from avow.sanity.claims import Claim
 
 @dataclass(frozen=True, slots=True)
 class Bounds:
-    """Limits on the analysis of a node: effort for one question whose answer makes a contract good or bad (a third
-    of it for warnings and notes; less, the more went into questions that stayed open), and the solver's seed."""
+    """Limits on the analysis of a node: effort for one query of a claim with severity error (a third of it for warnings
+    and notes; the more went into claims that stayed open, the less), and the solver's seed."""
 
     effort: int = 3_000
     seed: int = 0
@@ -25,29 +25,29 @@ class Bounds:
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """What was found of a claim."""
+    """The result for a claim."""
 
     verdict: Verdict
     explanation: str = ""
     clauses: tuple[str, ...] = ()
-    """Those that a refutation or a proof rests on (of a conflict: the first one's), without the node's name."""
+    """The clauses that a refutation or a proof depends on (for conflicts, of the first), without the node's name."""
     counterexample: Counterexample | None = None
     conflicts: tuple[tuple[tuple[str, ...], Counterexample], ...] = ()
     """Every conflict found: a minimal set of clauses that cannot all be met, with an input and what each demands."""
     because: str | None = None
-    """The name of the result of which this one is a mere consequence."""
+    """The name of the result of which this one is only a consequence."""
     engine: str = "z3"
     bounded: bool = False
-    """The answer is about the scenario only."""
+    """The answer holds only for the scenario."""
     cut_short: bool = False
-    """The search for conflicts was: there may be others, or smaller ones."""
+    """The search for conflicts was cut short: there may be others, or smaller ones."""
     example: Mapping[Variable, Value] = field(default_factory=dict)
-    """Values for which what was asked holds, where there are."""
+    """Values for which the claim holds, if known."""
 
 
 @dataclass(frozen=True, slots=True)
 class SanityResult(Finding):
-    """What became of one claim of a node, in so many seconds."""
+    """The result for one claim of a node, and the seconds that it took."""
 
     node: str = field(kw_only=True)
     asked: Claim = field(kw_only=True)
@@ -65,13 +65,13 @@ class SanityResult(Finding):
 
     @property
     def fails(self) -> bool:
-        """Whether it is reason enough to call the contract bad."""
+        """Whether it makes the contract bad: refuted, with severity error."""
         return self.verdict is Verdict.REFUTED and self.asked.severity is Severity.ERROR
 
 
 @dataclass(slots=True)
 class Patience:
-    """Effort for one question: less, the more went into claims that stayed open."""
+    """Effort for one query: the more went into claims that stayed open, the less."""
 
     full: int
     lost: float = 0.0
@@ -80,7 +80,7 @@ class Patience:
         self.lost += effort
 
     def effort(self, serious: bool) -> int:
-        """What is merely worth knowing is not worth much."""
+        """Effort for one query; warnings and notes get a third of it."""
         share = 1 / (1 + self.lost / self.full)
         return max(1, int(self.full * share) // (1 if serious else 3))
 
@@ -124,7 +124,7 @@ _SUMMARY = {
 
 
 def never_demanded(condition: Term, *, among: int) -> str:
-    """That a guarantee's condition cannot come about; which one, where it has several."""
+    """The message that a guarantee's condition cannot arise; it names the condition if there are several."""
     if among == 1:
         return "what it demands is never demanded: its condition cannot come about"
     return f"one of its {among} conditions cannot come about: {show_term(condition)}"

@@ -1,9 +1,9 @@
-"""Realizability of a contract with memory: can the node keep its guarantees for ever, whatever allowed inputs come?
+"""Realizability of a contract with state variables: can the node keep its guarantees for ever, for all allowed inputs?
 
-A memory is viable where every allowed input has an output that meets the guarantees and leaves a viable memory: the
-greatest such set. With finitely many inputs, outputs and memories all that a run can reach is played through; else the
-set is approached from above by eliminating quantifiers. Nothing that this finds is taken from it: that a set is closed
-and holds the first memory, that an input leads out of it whatever the answer, are questions of their own to the solver.
+A state (memory) is viable if every allowed input has an output that meets the guarantees and leads to a viable state:
+the greatest such set. With finitely many inputs, outputs and states, a game over all reachable states is solved;
+otherwise the set is approximated from above by quantifier elimination. The results are not trusted: separate solver
+queries check that a set is closed and contains the first state, or that an input leads out of it for every output.
 """
 
 from __future__ import annotations
@@ -46,27 +46,27 @@ from avow.solving.translation import same_session
 
 _Memory = tuple[Value, ...]
 _Move = tuple[Mapping[str, Value], tuple[tuple[Mapping[str, Value], _Memory], ...]]
-"""An allowed input, and the outputs that meet the guarantees, each with the memory that it leaves."""
+"""An allowed input, and the outputs that meet the guarantees, each with the memory after it."""
 
 
 @dataclass(frozen=True, slots=True)
 class Viability:
-    """Whether the node can go on for ever, and why not: the environment's moves up to where no output is left."""
+    """Whether the node can continue for ever, and if not, the environment's moves up to a step without an output."""
 
     verdict: Verdict
     reason: str = ""
     run: Counterexample | None = None
     clauses: tuple[str, ...] = ()
-    """The guarantees that conflict, where they are known."""
+    """The guarantees that conflict, if known."""
     reachable: Term | None = None
-    """The memories that runs which keep the contract can reach; None where they are not known."""
+    """The memories that runs that keep the contract can reach; None if unknown."""
     lasting: Term | None = None
-    """Those that runs reach which can go on for ever; None where they are not known."""
+    """The memories that such runs can reach and continue from for ever; None if unknown."""
 
 
 @dataclass(frozen=True, slots=True)
 class Contract:
-    """The node's contract of one step, with its memory before and after."""
+    """The node's contract over one step, with its memory before and after."""
 
     remembering: Remembering
     effort: int = 10_000
@@ -89,8 +89,8 @@ class Contract:
         return {clause.name: clause.formula for clause in self.remembering.node.guarantees}
 
     def divided(self) -> tuple[list[Term], Contract]:
-        """The assumptions on inputs that nothing else depends on, and the contract without these: they only matter in
-        that they can be met."""
+        """The assumptions on inputs that nothing else depends on, and the contract without these: it only matters
+        whether they can be met."""
         node, cells = self.remembering.node, self.remembering.cells
         known = {v for g in self.promised.values() for v in free_variables(g)}
         known = known.union(*(free_variables(cell.now) for cell in cells), (cell.before for cell in cells))
@@ -109,14 +109,14 @@ class Contract:
         return {cell.before: cell.initial for cell in self.remembering.cells if cell.initial is not None}
 
     def after(self, region: Term) -> Term:
-        """That the memory which a step leaves is in a region."""
+        """The formula that the memory after a step is in a region."""
         return substitute(region, {cell.before: cell.now for cell in self.remembering.cells})
 
     def at_first(self, region: Term) -> Term:
         return substitute(region, self.first)
 
     def asked_again(self, impossible: Sequence[Term]) -> None:
-        """Ask cvc5, where it is installed, of what Z3 said that nothing meets it. Raises Contradicted."""
+        """Check with cvc5, if installed, the formulas that Z3 found unsatisfiable. Raises Contradicted."""
         if contradicted(impossible, effort=self.effort):
             raise Contradicted
 
@@ -143,8 +143,8 @@ class Contract:
 
 
 def told_apart(remembering: Remembering) -> Remembering:
-    """The same contract with a cell for each value of a quantified variable, where that has few: a cell that is a
-    function is no value of a game. All cells stay as they are where one has too many."""
+    """The same contract with a cell for each value of a quantified variable, if these are few: a game cannot have a
+    function as a cell. All cells stay as they are if one has too many values."""
     kept: list[Cell] = []
     parts: dict[Variable, list[tuple[tuple[Term, ...], Variable]]] = {}
     for cell in remembering.cells:
@@ -186,12 +186,12 @@ def told_apart(remembering: Remembering) -> Remembering:
 
 
 class Contradicted(Exception):  # noqa: N818 - it says what happened
-    """cvc5 says the opposite of what Z3 does."""
+    """cvc5 and Z3 give opposite answers."""
 
 
 @same_session()
 def viable(remembering: Remembering, *, effort: int = 10_000, seed: int = 0) -> Viability:
-    """Decide it, as far as it can be decided."""
+    """Decides viability as far as possible."""
     remembering = told_apart(remembering)
     if remembering.unsaid:
         name, why = next(iter(remembering.unsaid.items()))
@@ -213,15 +213,16 @@ def viable(remembering: Remembering, *, effort: int = 10_000, seed: int = 0) -> 
             case "unsat":
                 contract.asked_again([conjunction(apart)])
                 return Viability(Verdict.PROVED, "no input is allowed at any step")
-            case _:  # no answer
+            case _:  # undecided
                 return Viability(Verdict.UNKNOWN, "whether its assumptions can be met is open")
     except Contradicted:
         return Viability(Verdict.ERROR, CONTRADICTED)
 
 
 def lasting(node: Node, *, effort: int = 10_000, seed: int = 0) -> Viability:
-    """Whether there are inputs, step by step for ever, that meet a node's assumptions: as if they were the outputs of a
-    node that promises what is assumed, at the pace of its steps where what is assumed depends on time."""
+    """Whether there are inputs, step by step for ever, that satisfy a node's assumptions: decided as viability of a
+    node with these inputs as outputs and the assumptions as guarantees, at the node's pace if the assumptions depend on
+    time."""
     in_time = any(timed(c.formula) for c in node.assumptions)
     made = one_step(replace(node, guarantees=tuple(c for c in node.guarantees if in_time and c.pace is not None)))
     ports = (*made.node.inputs, *made.node.outputs)
@@ -236,7 +237,7 @@ def lasting(node: Node, *, effort: int = 10_000, seed: int = 0) -> Viability:
 
 
 def _decided(contract: Contract) -> Viability:
-    if any(cell.parameters for cell in contract.remembering.cells):  # no term writes such a memory down
+    if any(cell.parameters for cell in contract.remembering.cells):  # no term denotes such a memory
         if contract.closed(TRUE):
             return Viability(Verdict.PROVED, "whatever was before")
         return Viability(Verdict.UNKNOWN, "something is remembered for each value of a quantified variable")
@@ -254,13 +255,13 @@ def _decided(contract: Contract) -> Viability:
 
 @dataclass(slots=True)
 class _Game:
-    """All that a run can reach, where that is finite and small."""
+    """The game over all reachable memories, if these are finite and few."""
 
     contract: Contract
     moves: dict[_Memory, list[_Move]] = field(default_factory=dict)
     first: _Memory = ()
     lost: dict[_Memory, tuple[int, _Move]] = field(default_factory=dict)
-    """A memory from which the environment wins → in how many rounds found, and its move."""
+    """A memory from which the environment wins → the round in which this was found, and its move."""
 
     def explored(self) -> bool:
         remembering = self.contract.remembering
@@ -318,7 +319,7 @@ class _Game:
         return Viability(Verdict.REFUTED, run=self._run(), reachable=reachable)
 
     def _lasting(self) -> list[_Memory]:
-        """What is reached by answers after which the node can go on, whatever comes."""
+        """The memories reached by outputs after which the node can continue for all inputs."""
         found = {self.first: None}
         for memory in (waiting := [self.first]):
             left = {after: None for _, answers in self.moves[memory] for _, after in answers if after not in self.lost}
@@ -348,7 +349,7 @@ class _Game:
         return conjunction(equation(v, value_term(x, v.sort)) for v, x in zip(cells, memory, strict=True))
 
     def _confirmed(self) -> bool:
-        """Whether the solver shows of each memory that the environment's moves lead to that no answer leads out."""
+        """Whether the solver shows, for each memory that the environment's moves lead to, that no output leads out."""
         asked, waiting, none = set[_Memory](), [self.first], list[Term]()
         contract = self.contract
         while waiting:
@@ -384,8 +385,8 @@ class _Game:
 
 
 def _defeated(contract: Contract, length: int) -> Viability | None:
-    """By inputs for so many first steps that are chosen ahead: as if these steps were one, whose outputs are those of
-    all of them. None where there are no such inputs, or none are found."""
+    """A refutation by inputs for the first `length` steps, chosen in advance: these steps are treated as one, with the
+    outputs of all. None if there are no such inputs, or none are found."""
 
     def at(variable: Variable, step: int) -> Variable:
         return Variable(variable.role, f"{variable.name} at {step}", variable.sort)
@@ -400,7 +401,7 @@ def _defeated(contract: Contract, length: int) -> Viability | None:
     inputs = [at(v, step) for step in range(1, length + 1) for v in contract.inputs]
     outputs = [at(v, step) for step in range(1, length + 1) for v in contract.outputs]
     if any(v in outputs for f in known.values() for v in free_variables(f)):
-        return None  # whether an input is allowed hangs on the answers
+        return None  # whether an input is allowed depends on the outputs
     if not all(_plain(v.sort) for v in inputs):
         return None
     if sum(1 for f in wanted.values() for _ in subterms(f)) > AHEAD_SIZE:
@@ -409,7 +410,7 @@ def _defeated(contract: Contract, length: int) -> Viability | None:
     answer = realizable(inputs, outputs, known, wanted, effort=effort, seed=contract.seed, doubtful=True)
     if answer.verdict is not Verdict.REFUTED:
         return None
-    given = {v: value_term(answer.inputs[v], v.sort) for v in inputs if v in answer.inputs}  # else: whatever it is
+    given = {v: value_term(answer.inputs[v], v.sort) for v in inputs if v in answer.inputs}  # otherwise: any value
     left = {label: substitute(f, given) for label, f in wanted.items()}
     conflict = solve(left, effort=contract.effort, seed=contract.seed, values="unused")
     if conflict.status != "unsat":
@@ -427,7 +428,7 @@ def _defeated(contract: Contract, length: int) -> Viability | None:
 
 
 def steps_of(number: int) -> str:
-    """A number of steps, for people."""
+    """A number of steps in words."""
     return "a step" if number == 1 else f"{number} steps"
 
 
@@ -436,7 +437,7 @@ def _plain(sort: Sort) -> bool:
 
 
 def _approached(contract: Contract) -> Viability:
-    """By eliminating quantifiers, round by round."""
+    """Decides viability by quantifier elimination, round by round."""
     unknown = Viability(Verdict.UNKNOWN, "which memories are viable could not be worked out")
     region: Term = TRUE
     some = {v: Variable(Role.BOUND, f"some {v.name}", v.sort) for v in contract.outputs}
@@ -451,7 +452,7 @@ def _approached(contract: Contract) -> Viability:
         found = eliminated(exact)
         if found is None:
             return unknown
-        # the elimination counts only where the solver shows that both say the same
+        # the elimination counts only if the solver shows that both are equivalent
         for one, other in ((found, exact), (exact, found)):
             if entails([one], other, effort=contract.effort, seed=contract.seed).verdict is not Verdict.PROVED:
                 return unknown

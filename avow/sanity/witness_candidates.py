@@ -1,8 +1,7 @@
-"""What the guarantees demand of the outputs, and under which conditions: the raw material of witnesses.
+"""The demands of the guarantees on the outputs, and their conditions: the raw material of witnesses.
 
-See `avow.sanity.witnesses` for what it is for. Nothing here has to be complete or even right for a verdict to be:
-whatever is made of it is proved to work before it counts. Only the `axioms` must be true of suitable `constants` for
-all inputs.
+`avow.sanity.witnesses` explains the purpose. Nothing here has to be complete or even correct for a verdict to be sound:
+every witness is proved to work before it counts. Only the `axioms` must be true of suitable `constants` for all inputs.
 """
 
 from __future__ import annotations
@@ -32,15 +31,15 @@ class Definition:
 
 @dataclass(slots=True)
 class Candidates:
-    """What the guarantees suggest. `axioms` are true of suitable `constants`, whatever the inputs."""
+    """The suggestions of the guarantees. `axioms` are true of suitable `constants` for all inputs."""
 
     outputs: tuple[t.Variable, ...]
     constants: list[t.Variable] = field(default_factory=list)
     axioms: list[t.Term] = field(default_factory=list)
     least: list[t.Term] = field(default_factory=list)
-    """Axioms too, that not every question needs: a natural number that is chosen is the least one that there is."""
+    """Further axioms, which not every query needs: a chosen natural number is the least one that exists."""
     extremes: dict[t.Term, Extreme] = field(default_factory=dict)
-    """What some of the axioms say: the position that is chosen is the first of the best."""
+    """The meaning of some of the axioms: the chosen position is the first of the best."""
     values: dict[t.Variable, list[t.Term]] = field(default_factory=dict)
     lower: dict[t.Variable, list[Definition]] = field(default_factory=dict)
     upper: dict[t.Variable, list[Definition]] = field(default_factory=dict)
@@ -48,14 +47,14 @@ class Candidates:
     chosen: dict[s.Sort, list[t.Term]] = field(default_factory=dict)
     """Constants with an axiom: the likeliest arguments."""
     blocks: list[tuple[t.Term, ...]] = field(default_factory=list)
-    """The same, in the groups in which they were chosen."""
+    """The same constants, in the groups in which they were chosen."""
     pool: dict[s.Sort, list[t.Term]] = field(default_factory=dict)
     floors: dict[t.Term, t.Variable] = field(default_factory=dict)
     bounds: dict[t.Variable, list[t.Term]] = field(default_factory=dict)
-    """What an output that is a real number is compared with."""
+    """The terms with which a real output is compared."""
     effort: int = 200_000
-    """What is left of it, in visits times conditions. `<=>` is read four ways, so a chain of them would double the work
-    with every link; and what is not read is not suggested, which is sound."""
+    """The remaining effort, in visits times conditions. `<=>` is read four ways, so a chain of them would double the
+    effort with every link. Formulas that are not read suggest nothing, which is sound."""
 
     def mentions(self, term: t.Term) -> bool:
         return any(part in self.outputs for part in subterms(term) if isinstance(part, t.Variable))
@@ -85,7 +84,7 @@ def _visit(
     conditions: tuple[t.Term, ...],
     open_variables: tuple[t.Variable, ...],
 ) -> None:
-    """`term` (negations pushed in) is demanded under `conditions`, for all `open_variables`.
+    """Reads `term` (in negation normal form), demanded under `conditions`, for all `open_variables`.
 
     `known` maps the bound variables on the way to their constants; `conditions` are in the term's own variables.
     """
@@ -138,7 +137,7 @@ def _visit(
                 parts = item.items if isinstance(item, t.And) else (item,)
                 guards = [part for part in parts if not found.mentions(part)]
                 inner = _choose(found, variables, guards, known)
-                # The chosen constants stand for the variables in all that follows, definitions too.
+                # The chosen constants replace the variables in everything that follows, including definitions.
                 here = {v: inner[v] for v in variables}
                 replaced = substitute(item, here)
                 _visit(found, replaced, inner, conditions, open_variables)
@@ -159,7 +158,7 @@ def _alternatives(term: t.Term) -> tuple[t.Term, ...]:
 def _choose(
     found: Candidates, variables: Sequence[t.Variable], guards: Sequence[t.Term], known: Mapping[t.Variable, t.Term]
 ) -> dict[t.Variable, t.Term]:
-    """A constant for each variable, such that the guards hold of them if they hold of anything."""
+    """A constant for each variable, such that the guards hold for them if they hold for any values."""
     inner = dict(known)
     fresh = {}
     for variable in variables:
@@ -190,7 +189,7 @@ def _extremes(
     item: t.Term,
     known: Mapping[t.Variable, t.Term],
 ) -> Iterator[t.Variable]:
-    """Constants for the positions that are decisive where a demand of all of them compares outputs with numbers."""
+    """Constants for the decisive positions, if a demand on all positions compares outputs with numbers."""
     if len(variables) > 1:
         return
     (position,) = variables
@@ -208,7 +207,7 @@ def _extremes(
 
 
 def _remember(found: Candidates, term: t.Term, known: Mapping[t.Variable, t.Term]) -> None:
-    """Keep the ground terms in a term that knows no output: arguments for constructors."""
+    """Keep the ground terms in a term that mentions no output: arguments for constructors."""
     for part in subterms(term):
         if part.sort == s.BOOL or isinstance(part, t.Quantified | t.SetTerm | t.SequenceRange) or found.mentions(part):
             continue
@@ -232,7 +231,7 @@ def _atom(
     conditions: tuple[t.Term, ...],
     open_variables: tuple[t.Variable, ...],
 ) -> None:
-    """An atom or negated atom that knows an output."""
+    """Reads an atom or negated atom that mentions an output."""
     positive = not isinstance(term, t.Not)
     atom = term.body if isinstance(term, t.Not) else term
     match atom:
@@ -257,7 +256,7 @@ def _atom(
 
 
 def _suggest(found: Candidates, left: t.Term, right: t.Term, operator: str, known: Mapping[t.Variable, t.Term]) -> None:
-    """From ``left ~ right``, where the left side holds one output: what that output could be."""
+    """From ``left ~ right``, with one output on the left side: possible values of that output."""
     while not isinstance(left, t.Variable):
         match left:
             case t.Widen(term=inner) if isinstance(right, t.Widen):
@@ -303,7 +302,7 @@ def _suggest(found: Candidates, left: t.Term, right: t.Term, operator: str, know
 
 
 def _floor(found: Candidates, value: t.Term, known: Mapping[t.Variable, t.Term]) -> t.Term:
-    """A constant for the greatest integer not greater than a number: there is one, but RCL has no term for it."""
+    """A constant for the greatest integer not greater than a number: it exists, but RCL has no term for it."""
     ground = substitute(value, dict(known))
     if ground not in found.floors:
         constant = t.Variable(t.Role.BOUND, f"floor ({len(found.constants) + 1})", s.INTEGER)
@@ -316,7 +315,7 @@ def _floor(found: Candidates, value: t.Term, known: Mapping[t.Variable, t.Term])
 
 
 def _halfway(found: Candidates, output: t.Variable, bound: t.Term) -> list[t.Term]:
-    """Between two numbers that a number is compared with lies the one half way."""
+    """The midpoints between the numbers with which an output is compared."""
     if not isinstance(output.sort, s.RealSort):
         return []
     others = found.bounds.setdefault(output, [])
@@ -345,7 +344,7 @@ def _definition(
     open_variables: Sequence[t.Variable],
     known: Mapping[t.Variable, t.Term],
 ) -> Definition | None:
-    """The arguments at which a demand is made: where the open variables take values that meet the conditions."""
+    """The arguments at which a demand is made: those with values of the open variables that satisfy the conditions."""
     sort = function.sort
     assert isinstance(sort, s.FunctionSort)
     if any(function in free_variables(term) for term in (*arguments, *conditions)):
@@ -380,7 +379,7 @@ def _definition(
 
 
 def _stands_for(parameter: t.Variable, argument: t.Variable) -> bool:
-    """Whether a function's parameter may stand for a variable (an integer for a natural: where it is not negative)."""
+    """Whether a function's parameter may replace a variable (an integer for a natural, if it is not negative)."""
     return argument.sort == parameter.sort or (argument.sort, parameter.sort) == (s.NATURAL, s.INTEGER)
 
 
@@ -393,7 +392,7 @@ def _branch(
     open_variables: Sequence[t.Variable],
     known: Mapping[t.Variable, t.Term],
 ) -> None:
-    """``out.f(arguments) == value`` is demanded under the conditions."""
+    """Reads a demand ``out.f(arguments) == value`` under the conditions."""
     if value.sort == s.BOOL or function in free_variables(value):
         return
     definition = _definition(function, arguments, conditions, open_variables, known)

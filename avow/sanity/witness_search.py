@@ -1,6 +1,6 @@
 """The search for the answer about one group of guarantees: is there an output for all inputs?
 
-See `avow.sanity.realizability` for the ways that are tried.
+`avow.sanity.realizability` lists the methods.
 """
 
 from __future__ import annotations
@@ -41,19 +41,19 @@ class Realizability:
     reason: str = ""
     engine: str = "z3"
     proofs: tuple[Proof, ...] = ()
-    """If proved: what was found for each group, to be checked by questions of their own (`avow.sanity.proofs`)."""
+    """If proved: the proof for each group, to be checked by separate queries (`avow.sanity.proofs`)."""
 
 
 @dataclass(frozen=True, slots=True)
 class Group:
-    """Guarantees that hang together by the outputs that they share."""
+    """Guarantees connected by the outputs that they share."""
 
     guarantees: Formulas
     outputs: tuple[Variable, ...]
 
 
 def groups(guarantees: Formulas, outputs: Sequence[Variable]) -> list[Group]:
-    """Guarantees that share outputs, together; each guarantee without outputs by itself."""
+    """Groups of guarantees that share outputs; each guarantee without outputs is a group by itself."""
     found: list[tuple[dict[str, Term], set[Variable]]] = []
     for label, formula in guarantees.items():
         mentioned = free_variables(formula) & set(outputs)
@@ -89,7 +89,7 @@ class Search:
         self.found = candidates(group.outputs, assumptions.values(), group.guarantees.values())
         self.witnesses: list[Witness] = witnesses(self.found)
         self.read = len(self.witnesses)
-        """So many were read off the contract; what follows these are outputs found for single inputs."""
+        """The number of witnesses read off the contract; later ones are outputs found for single inputs."""
         self.reason = ""
 
     def left(self) -> int:
@@ -141,7 +141,7 @@ class Search:
         if any(isinstance(output.sort, FunctionSort) for output in self.group.outputs):
             return None
         if any(isinstance(v.sort, FunctionSort) for v in self.inputs):
-            limit = max(50, limit // 3)  # an answer comes at once, or mostly not at all
+            limit = max(50, limit // 3)  # an answer usually comes at once or not at all
         bound = {v: Variable(Role.BOUND, f"any {v.name}", v.sort) for v in self.group.outputs}
         goal = conjunction(self.group.guarantees.values())
         never = Quantified(Quantifier.FORALL, tuple(bound.values()), negation(substitute(goal, bound)))
@@ -203,8 +203,8 @@ class Search:
         few: int | None,
         limit: int,
     ) -> list[Expr]:
-        """That the constants are as chosen, and no witness meets the guarantees (of those read off the contract, only
-        the first `few` are asked, and no more than can be written down with so much effort)."""
+        """Facts: the constants satisfy their axioms, and no witness meets the guarantees (of those read off the
+        contract, only the first `few`, and only as many as can be translated within the effort)."""
         end = until(limit)
         guarantees = list(guarantees)
         asked = self._asked(few)
@@ -215,7 +215,7 @@ class Search:
             spend(WITNESS_STEPS)
             try:
                 whole = {**meanings, **meanings_of(translator, witness, meanings)}
-            except Unsupported:  # `<1 upto in.n>` as a value: to suggest less is sound
+            except Unsupported:  # `<1 upto in.n>` as a value: leaving it out is sound
                 continue
             met = [
                 *translator.background(witness, whole),
@@ -228,7 +228,7 @@ class Search:
         return [*self.witnesses[: self.read][:few], *self.witnesses[self.read :]]
 
     def _axioms(self, asked: Iterable[Witness], guarantees: Iterable[Term]) -> list[Term]:
-        """What is known of the constants that these mention, and of those that this mentions in its turn."""
+        """The axioms of the constants that these mention, and of those that these axioms mention in turn."""
         wanted = frozenset[Variable]().union(*map(free_variables, guarantees), *map(_mentioned, asked))
         left, found = dict.fromkeys(self.found.axioms), dict[Term, None]()
         while fresh := [axiom for axiom in left if free_variables(axiom) & wanted & set(self.found.constants)]:
@@ -243,12 +243,12 @@ class Search:
     # -- refutation ----------------------------------------------------------------------------------------------------
 
     def _refute(self, limit: int) -> Realizability | None:
-        # The first candidate is the likeliest: inputs that defeat it mostly defeat all, and are much easier to find.
+        # The first candidate is the likeliest: inputs that defeat it usually defeat all, and are much easier to find.
         return self._refuted(limit // 2, 1) or self._refuted(limit // 3)
 
     def _refuted(self, limit: int, few: int | None = None) -> Realizability | None:
-        """Inputs without an output; None if none are found with so much effort. `few`: only so many witnesses are to be
-        defeated from the start."""
+        """Inputs without an output; None if none are found within the effort. `few`: the number of initial witnesses to
+        defeat."""
         end = until(limit)
         known = len(self.witnesses)
         while spent() < end and (few is None or len(self.witnesses) < known + WITNESS_REFUTATIONS):
@@ -262,7 +262,7 @@ class Search:
         return None
 
     def _defeat(self, limit: int, few: int | None) -> dict[Variable, Value] | None:
-        """Allowed inputs at which no known witness meets the guarantees; not judged yet."""
+        """Allowed inputs at which no known witness meets the guarantees; not yet judged."""
         translator = Translator()
         fixed = self._fixed(translator)
         constants = [*self.inputs, *self.found.constants]

@@ -1,11 +1,11 @@
-"""Candidate outputs, read off the guarantees: how `realizable` becomes a question that a solver can answer.
+"""Candidate outputs, read off the guarantees: they turn `realizable` into a query that a solver can answer.
 
-"For all inputs some output" is beyond solvers when asked so. But what a guarantee demands usually says what to
+"For all inputs some output" is too hard for solvers directly. But the demand of a guarantee usually shows what to
 output: `out.c == move(x, y)`, `out.f(x) <=> p(x)`, `t <= out.n`. Here these become *witnesses*: each output gets a term
 over the inputs, or a defining term if it is a function. Quantified variables on the way to the demand become constants,
-one for each, that satisfy the condition under which the demand is made if anything does (Hilbert's epsilon: adding such
-a constant with its axiom excludes no input). If for all inputs allowed at least one witness meets every guarantee, the
-node is realizable; which of them does may depend on the input (an if-then-else that nobody has to write down).
+one for each, that satisfy the condition of the demand if any value does (Hilbert's epsilon: adding such a constant with
+its axiom excludes no input). If for all allowed inputs at least one witness meets every guarantee, the node is
+realizable; which one may depend on the input (an implicit if-then-else).
 """
 
 from __future__ import annotations
@@ -63,8 +63,8 @@ def witnesses(found: Candidates) -> list[Witness]:
 
 
 def instantiate(found: Candidates, guarantee: t.Term, *, wide: bool = True) -> t.Term:
-    """A stronger guarantee: `exists` that concern an output are replaced by their instances at known terms; if not
-    `wide`, only at terms that were read together."""
+    """A stronger guarantee: each `exists` about an output is replaced by its instances at known terms; if not `wide`,
+    only at terms that were read together."""
     if depth(guarantee) > REWRITTEN_DEPTH:
         return guarantee
     return _instantiate(found, push_negations(guarantee), wide)
@@ -91,7 +91,7 @@ def _functions(found: Candidates, function: t.Variable, sort: s.FunctionSort) ->
     yield from dict.fromkeys(_partly_applied(found, parameters, sort))
     branches = found.branches.get(function, [])
     for default in _ground(found, sort.result)[:8]:
-        whole = default  # the first case whose condition holds, else that
+        whole = default  # the first case whose condition holds, otherwise the default
         for d, v in reversed(branches):
             value = substitute(v, dict(zip(d.parameters, parameters, strict=True)))
             whole = t.Conditional(_at(d, parameters), value, whole, sort.result)
@@ -105,8 +105,8 @@ def _functions(found: Candidates, function: t.Variable, sort: s.FunctionSort) ->
 def _partly_applied(
     found: Candidates, parameters: tuple[t.Variable, ...], sort: s.FunctionSort
 ) -> Iterable[Definition]:
-    """Functions that are given, with their first arguments fixed as somewhere in the formulas: where an assumption says
-    that there is a way by naming it (``in.way(in.start, in.goal, k)``), a plan may be just that."""
+    """Given functions with their first arguments fixed as somewhere in the formulas: if an assumption states that a way
+    exists by naming it (``in.way(in.start, in.goal, k)``), it may serve as the plan."""
     count = len(parameters)
     for term in found.pool.get(sort.result, ()):
         if not isinstance(term, t.Apply) or not isinstance(term.function.sort, s.FunctionSort) or found.mentions(term):
@@ -116,7 +116,7 @@ def _partly_applied(
 
 
 def _rising(found: Candidates, parameters: tuple[t.Variable, ...], sort: s.FunctionSort) -> Iterable[Definition]:
-    """Functions of a number that are different everywhere, and grow."""
+    """Strictly increasing functions of a number."""
     numbers = s.RealSort | s.IntegerSort | s.NaturalSort
     if [isinstance(part, numbers) for part in (*sort.parameters, sort.result)] != [True, True]:
         return
@@ -178,7 +178,7 @@ def _ground(found: Candidates, sort: s.Sort, level: int = 0) -> list[t.Term]:
         case s.SequenceSort():
             return list(dict.fromkeys([*seen, t.SequenceTerm((), sort)]))
         case s.OpaqueSort() if not seen:
-            # Nothing in the contract names an element, but the sort is not empty: any constant is one.
+            # Nothing in the contract names an element, but the sort is not empty: any constant will do.
             constant = t.Variable(t.Role.BOUND, f"{sort.name} (some)", sort)
             if constant not in found.constants:
                 found.constants.append(constant)
@@ -199,7 +199,7 @@ def _spread(combination: tuple[tuple[int, t.Term], ...]) -> tuple[int, int]:
 
 
 def _resolve(choice: Mapping[t.Variable, t.Term | Definition], found: Candidates) -> Witness | None:
-    """Put the chosen terms of other outputs where a candidate mentions them; None for a circle."""
+    """Substitute the chosen terms of other outputs into the candidates that mention them; None for a cycle."""
     outputs = set(found.outputs)
     terms = {output: value for output, value in choice.items() if not isinstance(value, Definition)}
     mentioned = {output: free_variables(value) & outputs for output, value in terms.items()}
@@ -217,7 +217,7 @@ def _resolve(choice: Mapping[t.Variable, t.Term | Definition], found: Candidates
             witness[output] = terms[output]
             continue
         if free_variables(value.body) & outputs - set(terms):
-            return None  # a function defined by another function that is an output: not tried
+            return None  # defined by another output function: not tried
         witness[output] = value
     return witness
 
@@ -235,7 +235,7 @@ def _instantiate(found: Candidates, term: t.Term, wide: bool) -> t.Term:
             places = _places(found, variables, wide)
             instances = [substitute(inner, dict(zip(variables, place, strict=True))) for place in places]
             return disjunction(instances) if instances else term
-        case _:  # no quantifier over outputs at its head
+        case _:  # no outermost quantifier about outputs
             return term
 
 
@@ -252,8 +252,8 @@ def _places(found: Candidates, variables: Sequence[t.Variable], wide: bool) -> l
 
 
 def applied(formula: t.Term, witness: Witness) -> t.Term:
-    """The formula with what a witness defines in the place of each application of it: what a quantified variable is
-    equal to is then seen (`avow.formulas.one_point_rule`)."""
+    """The formula with each application of a function that a witness defines replaced by its definition: this exposes
+    equations for quantified variables (`avow.formulas.one_point_rule`)."""
     defined = {output: value for output, value in witness.items() if isinstance(value, Definition)}
     if not defined:
         return formula
