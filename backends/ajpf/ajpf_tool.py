@@ -1,4 +1,4 @@
-"""AJPF itself, where it is installed: found through ``AJPF_HOME`` and a Java 11 (``AVOW_AJPF_JAVA``), run for one
+"""AJPF itself, if it is installed: found through ``AJPF_HOME`` and a Java 11 (``AVOW_AJPF_JAVA``), run for one
 property at a time, and judged by what it prints: its exit code is 0 for proved, violated and broken alike."""
 
 from __future__ import annotations
@@ -36,15 +36,15 @@ _PARSER = re.compile(
     re.MULTILINE,
 )
 _HARMLESS = re.compile(r"^line \d+:\d+ missing RR_NEWLINE at .*$", re.MULTILINE)
-"""MCAPL's parser says so of every program with reasoning rules, and reads them as they are meant."""
+"""MCAPL's parser prints this for every program with reasoning rules, and still reads them correctly."""
 _FRAMEWORK = re.compile(r"^MCAPL Framework (.+)$", re.MULTILINE)
 
 
 ALONE = ("-XX:-UsePerfData", "-Duser.home=.")
-"""Nothing is shared with other runs, and settings are looked for where the run's files are."""
+"""Nothing is shared with other runs, and settings are read from the folder of the run's files."""
 
 BRIEF = (*ALONE, "-XX:TieredStopAtLevel=1", "-XX:+UseSerialGC")
-"""For a Java that runs for a second or two: it compiles lightly, and starts no threads for its garbage."""
+"""For a Java process of a second or two: light compilation, and no threads for garbage collection."""
 
 
 class Said(StrEnum):
@@ -61,11 +61,11 @@ class Answer:
     reason: str = ""
     log: str = ""
     framework: str = ""
-    """What MCAPL calls its own version."""
+    """The version that MCAPL prints."""
     kept: bool = False
-    """It was given in an earlier run, to the same files (`asking.recall`)."""
+    """It comes from an earlier run with the same files (`asking.recall`)."""
     observed: tuple[Observed, ...] = ()
-    """What Java and its compiler looked at besides."""
+    """The other files that Java and its compiler read."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,7 +82,7 @@ class Installation:
         return Tool("AJPF", self.version, str(self.home), INSTALL, parts=parts, trial=_trial)
 
     def mark(self) -> str:
-        """Changes with any class, jar or program that is compiled anew or put in another's place."""
+        """Changes with any class, jar or program that is recompiled or replaced."""
         return sha256(repr((self.version, program_digest(self.tool.places))).encode()).hexdigest()
 
     def class_path(self, *folders: str) -> str:
@@ -91,7 +91,7 @@ class Installation:
 
 
 def _whole(program: str) -> str:
-    """The home of a Java's program; where it has none, the program."""
+    """The Java home of the program; if it has none, the program."""
     place = os.path.realpath(shutil.which(program) or program)
     home = Path(place).parent.parent
     return str(home) if (home / "lib" / "modules").is_file() else place
@@ -119,7 +119,7 @@ def _find(home_text: str, java: str) -> Installation | None:
 
 
 def _revision(home: Path) -> str:
-    """The commit of MCAPL's checkout; where it is none, a digest of its controller's class."""
+    """The commit of MCAPL's checkout; if it is not a checkout, a digest of its controller's class."""
     if (home / ".git").exists() and shutil.which("git"):
         said = run(["git", "-C", str(home), "rev-parse", "--short=10", "HEAD"], seconds=VERSION_SECONDS)
         if said.code == 0 and said.stdout.strip():
@@ -147,9 +147,9 @@ def _trial() -> str:
 
 
 def prepare(installation: Installation, folder: Path, files: Mapping[str, str], outside: Outside) -> str | None:
-    """Write the files of a run into a folder of its own and compile what is Java; why not, where that fails.
+    """Write the files of a run into a folder of its own and compile the Java files; the reason if that fails.
 
-    AIL splits what it is given at commas and knows ASCII names only: so every name in the folder is ours, MCAPL is
+    AIL splits its arguments at commas and accepts only ASCII names: so we choose every name in the folder, MCAPL is
     linked into it, and AJPF runs in it with relative names."""
     for name, text in files.items():
         (folder / name).write_text(text, encoding="utf-8")
@@ -178,7 +178,7 @@ def jpf_file(ail: str, properties: str, key: str, extra: str = "") -> str:
 def check(
     installation: Installation, folder: Path, key: str, seconds: float, megabytes: int, outside: Outside
 ) -> Answer:
-    """Ask for one property of what was prepared. Never raises for what AJPF does."""
+    """Check one property of the prepared run. Never raises because of AJPF."""
     jars = sorted(p.name for p in (installation.home / "lib" / "3rdparty").glob("guava*.jar"))
     path = ";".join([".", *(f"mcapl/lib/3rdparty/{jar}" for jar in jars)])
     (folder / f"{key}.jpf").write_text(jpf_file("agent.ail", "agent.psl", key, f"classpath = {path}\n"))
@@ -193,7 +193,7 @@ def check(
 
 
 def judge(done: Completed) -> Answer:
-    """What the output says. Anything unexpected is an error, never a pass."""
+    """The answer in the output. Anything unexpected is an error, never a pass."""
     text = _HARMLESS.sub("", done.stdout + "\n" + done.stderr)
     framework, parser = _FRAMEWORK.search(text), _PARSER.search(text)
     holds, violated = _NO_ERROR.search(text), _VIOLATED.search(text)

@@ -1,8 +1,8 @@
-"""AJPF asked for all properties of an agent: in a folder of our own, several at a time, each with its own limit.
+"""AJPF run for all properties of an agent: in a folder of our own, several at a time, each with its own limit.
 
-One property takes seconds to hours, and the same files have the same answer: what was decided is kept, with all that
-was printed, under a digest of everything that was given: program, environment, property, MCAPL's own files, Java. The
-note is bound to this user (`notes`): an edited one is none.
+One property takes seconds to hours, and the same files have the same answer: decisive answers are cached, with all
+output, under a digest of all inputs: program, environment, property, MCAPL's own files, Java. The note is bound to this
+user (`notes`): an edited one is ignored.
 """
 
 from __future__ import annotations
@@ -32,18 +32,18 @@ from .java import CLASS
 from .options import Setup
 
 _FORM = 4
-"""Of what is asked and how answers are read: another number, and nothing that was kept counts."""
+"""The version of the requests and of the reading of answers: changing it invalidates the cache."""
 _DECIDED = (Said.HOLDS, Said.VIOLATED)
 
 
 def key(files: Mapping[str, str], formula: str, mark: str) -> str:
-    """Of one question to one installation (`Installation.mark`)."""
+    """The cache key of one request to one installation (`Installation.mark`)."""
     asked = {name: text for name, text in files.items() if not name.endswith(".psl")}
     return sha256(json.dumps([_FORM, asked, formula, mark], sort_keys=True))
 
 
 def recall(key: str) -> Answer | None:
-    """What was kept, where all that was looked at is as it was."""
+    """The cached answer, if all files that it depends on are unchanged."""
     kept = read_note(Answer, _path(key))
     if kept is None or kept.said not in _DECIDED or any(look(o.kind, o.path) != o.digest for o in kept.observed):
         return None
@@ -51,7 +51,7 @@ def recall(key: str) -> Answer | None:
 
 
 def keep(key: str, answer: Answer) -> None:
-    """What decided nothing, or cannot be written, will be asked again."""
+    """An answer that decides nothing, or cannot be written, is not cached: the request will be re-run."""
     if answer.said in _DECIDED and not answer.kept:
         with suppress(OSError):
             write_note(_path(key), answer)
@@ -64,11 +64,11 @@ def _path(key: str) -> Path:
 def ask(
     installation: Installation, setup: Setup, properties: Sequence[Property], seconds: float, megabytes: int
 ) -> dict[str, Answer]:
-    """An answer for each property, by its key. What was answered before is not asked again. What is left of `seconds`
-    is shared out among those still to come, so that one that takes for ever costs the others nothing."""
+    """An answer for each property, by its key. Cached answers are not re-run. The rest of `seconds` is shared among the
+    remaining properties, so that one that never ends costs the others nothing."""
     given = {**system_files(setup, "agent"), "agent.psl": psl_file(properties)}
     keys: dict[str, str] = {}
-    if setup.environment_class:  # of a class that the plan gives, only the name is known
+    if setup.environment_class:  # for a class that the plan gives, only the name is known
         del given[f"{CLASS}.java"]
     else:
         mark = installation.mark()

@@ -1,6 +1,6 @@
 """The AJPF backend: a node's guarantees as temporal properties of the Gwendolen program that implements it.
 
-Imports stay light: whoever lists the backends does not load a parser and a model checker.
+Imports stay light: listing the backends does not load a parser and a model checker.
 """
 
 from __future__ import annotations
@@ -52,8 +52,8 @@ class AjpfBackend(Backend):
         return (ajpf_tool.tool(),)
 
     def suits(self, node: Node) -> bool:
-        """Agents decide: some output is a choice, none is a number or a table of numbers, and no clause measures. What
-        compares or computes measured values is a program's affair, and Gwendolen has no arithmetic for it."""
+        """Agents decide: some output is a choice, none is a number or a table of numbers, and no clause measures.
+        Comparing or computing measured values is left to programs, and Gwendolen has no arithmetic for it."""
         sorts = [port.sort for port in node.outputs]
         decides = any(
             isinstance(sort, DataSort) or (isinstance(sort, EnumSort) and len(sort.members) > 1) for sort in sorts

@@ -13,19 +13,19 @@ from .tuning import RULE_DEPTH, RULE_STEPS
 
 
 class TooDeep(Exception):  # noqa: N818 - it names what happened
-    """Reasoning rules call each other without end, or nearly so; or what they ask for takes too many steps to find."""
+    """Reasoning rules call each other without end, or nearly so; or a query takes too many steps."""
 
 
 @dataclass(frozen=True, slots=True)
 class Beliefs:
-    """`own` were added by the agent (or stood in the program), `perceived` by perception; what it had when the other
-    came is not added again. Beliefs of one name are tried in the order of their texts."""
+    """`own` were added by the agent (or are in the program), `perceived` by perception; a belief of one kind is not
+    added again as the other. Beliefs of one name are tried in the order of their texts."""
 
     own: frozenset[Struct]
     perceived: frozenset[Struct]
     index: Mapping[tuple[str, int], tuple[Struct, ...]] = field(compare=False, repr=False)
     percepts: tuple[Struct, ...] = field(compare=False, repr=False)
-    """What is perceived, in the order in which AIL looks whether it is gone."""
+    """The percepts, in the order in which AIL checks whether they are gone."""
 
     @staticmethod
     def of(own: frozenset[Struct], perceived: frozenset[Struct]) -> Beliefs:
@@ -51,7 +51,7 @@ class Reasoner:
     rules: Mapping[tuple[str, int], Sequence[Rule]]
     fresh: Iterator[int] = field(default_factory=count)
     steps: int = 0
-    """Beliefs and rules that were tried for the question at hand."""
+    """Beliefs and rules that were tried for the current query."""
 
     @staticmethod
     def of(rules: Sequence[Rule]) -> Reasoner:
@@ -63,12 +63,12 @@ class Reasoner:
     def first_way(
         self, beliefs: Beliefs, conditions: Sequence[Condition], bindings: Bindings, goals: Sequence[Goal]
     ) -> Bindings | None:
-        """The first way to meet all conditions, if there is any. Raises TooDeep."""
+        """The first way to meet all conditions, if any. Raises TooDeep."""
         self.steps = 0
         return next(self.holds(beliefs, conditions, bindings, goals), None)
 
     def derived(self, beliefs: Beliefs, term: Term) -> Bindings | None:
-        """The first way to believe the term, if there is any. Raises TooDeep."""
+        """The first way to believe the term, if any. Raises TooDeep."""
         self.steps = 0
         return next(self.believes(beliefs, term, {}), None)
 
@@ -107,9 +107,9 @@ class Reasoner:
             yield from self.holds(beliefs, renamed.body, found, (), depth + 1)
 
     def _passes(self, beliefs: Beliefs, conditions: Sequence[Condition], bindings: Bindings, depth: int) -> bool:
-        """Whether a rule with a cut gets as far as its last condition. AIL's iterator then takes it for cut before its
-        first answer: such a rule derives nothing, and none that comes after it is tried. What was found before a cut
-        stands, and so does the first way to meet each condition after it."""
+        """Whether a rule with a cut meets its last condition. AIL's iterator then treats it as cut before its first
+        answer: such a rule derives nothing, and no later rule is tried. The bindings found before a cut are kept, and
+        so is the first way to meet each condition after it."""
         at = next((n for n, c in enumerate(conditions) if c.is_cut), len(conditions))
         found = next(self.holds(beliefs, conditions[:at], bindings, (), depth), None)
         for condition in conditions[at:]:
@@ -162,8 +162,8 @@ class Reasoner:
 
 
 def _sent(beliefs: Beliefs, term: Struct, bindings: Bindings) -> Iterator[Bindings]:
-    """The messages sent that are meant. A variable for an agent's name comes to be a text, as in AIL: no belief about
-    the agent has it then."""
+    """The matching messages that were sent. A variable for an agent's name is bound to a text, as in AIL: no belief
+    about the agent has it then."""
     meant = apply(term, bindings)
     assert isinstance(meant, Struct)
     for message in beliefs.index.get((SENT, 4), ()):

@@ -1,4 +1,4 @@
-"""Actions that compute: AIL's environments carry them out themselves, and they count as actions for all that."""
+"""Actions that compute: AIL's environments execute them themselves, and they still count as actions."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ COMPUTING = frozenset((*_ARITHMETIC, "append", "toString"))
 
 
 def compute(action: Struct) -> Bindings:
-    """What carrying out the action binds. Raises Crash."""
+    """The bindings that result from the action. Raises Crash."""
     if action.functor in _ARITHMETIC and len(action.args) >= 3:
         left, right = number(action.args[0]), number(action.args[1])
         if left is None or right is None:
@@ -55,7 +55,7 @@ def _bound(action: Struct, at: int, value: Struct) -> Bindings:
 
 
 def compare(test: str, term: Term, bindings: Bindings) -> Iterator[Bindings]:
-    """Two numbers compared; ``==`` with one side free binds it. What cannot be computed does not hold."""
+    """Two numbers compared; ``==`` with one side free binds it. A comparison that cannot be computed does not hold."""
     assert isinstance(term, Struct)
     left, right = term.args
     values = (value_of(left), value_of(right))
@@ -70,7 +70,7 @@ def compare(test: str, term: Term, bindings: Bindings) -> Iterator[Bindings]:
 
 
 def value_of(term: Term) -> float | None:
-    """The value of an arithmetic expression; None where it has a free variable, or no value."""
+    """The value of an arithmetic expression; None if it has a free variable, or no value."""
     if isinstance(term, Struct) and term.functor in _OPERATORS and len(term.args) == 2:
         left, right = map(value_of, term.args)
         if left is None or right is None:
@@ -80,7 +80,7 @@ def value_of(term: Term) -> float | None:
 
 
 def computed(term: Term) -> Term:
-    """The term with the values of the arithmetic expressions in it, as far as they have one."""
+    """The term with its arithmetic expressions replaced by their values, if they have one."""
     if isinstance(term, Var) or not term.args:
         return term
     value = value_of(term)

@@ -26,8 +26,8 @@ from .tuning import LAZY_STATES
 
 @dataclass(frozen=True, slots=True)
 class Kripke:
-    """States by numbers, their successors, and a label for each: a bit set. Runs are endless: one that comes to a state
-    without successors is none."""
+    """States by numbers, their successors, and a label for each: a bit set. Runs are infinite: a path to a state
+    without successors is not a run."""
 
     initial: tuple[int, ...]
     successors: Sequence[Sequence[int]]
@@ -38,8 +38,8 @@ class Kripke:
 
 
 def shortened(graph: Graph, labels: Sequence[int]) -> Kripke:
-    """The graph without states whose only way leads to a later one of their own label: most are of that kind, as an
-    agent decides next to nothing between two draws."""
+    """The graph without states whose only successor is a later state with the same label: most states are such, as an
+    agent decides very little between two draws."""
     offsets, targets = graph.offsets, graph.targets
     ends = array("i", range(len(graph)))
     for state in range(len(graph) - 1, -1, -1):
@@ -53,8 +53,8 @@ def shortened(graph: Graph, labels: Sequence[int]) -> Kripke:
 def reduce(graph: Kripke) -> Kripke:
     """A smaller graph with the same runs up to stuttering (and up to nothing else: endless stuttering stays).
 
-    States of one label that reach each other become one with a loop; a state whose only way leads to a state of its
-    own label becomes that state. Properties without "next" do not see the difference.
+    States of one label that reach each other become one with a loop; a state whose only successor has the same label
+    becomes that state. Properties without "next" do not distinguish the two graphs.
     """
     labels, successors = graph.labels, graph.successors
 
@@ -67,7 +67,7 @@ def reduce(graph: Kripke) -> Kripke:
     new_labels: list[int] = []
     seen: dict[tuple[int, bool, tuple[int, ...]], int] = {}
     pending: list[tuple[int, list[int], bool]] = []
-    # Components come after those that they reach along equal labels, so "only way leads to its own label" is known.
+    # Components come after those that they reach along equal labels, so "only successor has its label" is known.
     for component in strong_components(range(len(labels)), alike):
         label = labels[component[0]]
         members = set(component)
@@ -118,18 +118,18 @@ class OutOfTime(Exception):  # noqa: N818 - it names a state, not a fault
 
 @dataclass(frozen=True, slots=True)
 class Property:
-    """A formula to check. Of the shape ``[] (trigger -> consequent)`` it knows its trigger, for vacuity."""
+    """A formula to check. `trigger` is given if it has the shape ``[] (trigger -> consequent)``, for vacuity."""
 
     key: str
-    """Names it in a .psl file: ASCII letters, digits and ``_``."""
+    """Its name in a .psl file: ASCII letters, digits and ``_``."""
     formula: Formula
     trigger: Formula | None = None
     goal: Formula | None = None
-    """What must follow the trigger, without its "eventually"."""
+    """The formula that must follow the trigger, without its "eventually"."""
     about: str = ""
     """The instance in words: ``i = 3``."""
     forbidden: Formula | None = None
-    """What must not come once the trigger is met, of ``[] (trigger -> [] ~forbidden)``."""
+    """The formula that must not hold once the trigger is met, from ``[] (trigger -> [] ~forbidden)``."""
     indecisive: str = ""
     """Why a run on which it fails refutes nothing, if it does not."""
 
@@ -143,10 +143,10 @@ class Result:
     immediate: bool
     """Wherever the trigger is met, so is the goal, at once: nothing had to happen."""
     valid: bool = False
-    """It holds of every agent with these reasoning rules and lasting beliefs, whatever its plans are: what the table
-    made of the claim is a tautology."""
+    """It holds for every agent with these reasoning rules and lasting beliefs, whatever its plans are: the table turned
+    the claim into a tautology."""
     answered: bool = False
-    """What is forbidden is the agent's answer to the trigger (`Checker._answered`)."""
+    """The forbidden formula is the agent's answer to the trigger (`Checker._answered`)."""
 
 
 @dataclass(slots=True)
@@ -192,9 +192,9 @@ class Checker:
         return Result(wanted.key, holds, vacuous, immediate and not valid, valid, answered)
 
     def _answered(self, wanted: Property) -> bool:
-        """Whether there is an occasion (the trigger is met, and was not just before) to which what is forbidden is the
-        answer: on every way, it is so when the agent acts next or the environment has its say. An action done before
-        the occasion is no answer to it, and what was so before may stay so only until then."""
+        """Whether there is an occasion (the trigger is met, and was not just before) to which the forbidden formula is
+        the answer: on every path, it holds when the agent next acts or the environment next draws. An action done
+        before the occasion is no answer to it; a formula that held before may hold only until then."""
         if wanted.trigger is None or wanted.forbidden is None or self.graph.unfinished is not None:
             return False
         graph, labels, core = self.graph, self.labels, self.graph.system.core
@@ -222,7 +222,7 @@ class Checker:
         return not good.isdisjoint(occasions)
 
     def lasso(self, refuted: Property) -> Lasso | None:
-        """A run of the agent itself on which the property fails; if there is one, among the states found first."""
+        """A run of the agent itself on which the property fails; if possible, one among the states found first."""
         automaton, fair, labels = self._projected(refuted, self.labels)
         graph, few = self.graph, range(LAZY_STATES)
 
@@ -290,7 +290,7 @@ def label_states(system: System, states: Iterable[Any], wanted: Sequence[Atom]) 
 
     if not isinstance(system, Agent) or labels[0].intended:
         return list(map(label, states))
-    of_core = cache(lambda core: label(core << BITS))  # what is not asked of intentions, the queue does not bear on
+    of_core = cache(lambda core: label(core << BITS))  # without atoms about intentions, the queue does not matter
     return [of_core(state >> BITS) for state in states]
 
 
@@ -305,7 +305,7 @@ def _of_draw(offered: Sequence[Struct], fair: Sequence[tuple[int, Struct]]) -> i
 
 
 class Labels:
-    """What one agent believes, wants and intends of what is asked, as bits."""
+    """The atoms that hold for one agent's beliefs, goals and intentions, as bits."""
 
     def __init__(self, agent: Agent, numbered: Sequence[tuple[int, Atom]]) -> None:
         self.agent = agent
@@ -360,11 +360,11 @@ def _mental(frames: Iterable[Frame], wanted: Sequence[tuple[int, Modality, Term]
 
 
 def asked(properties: Iterable[Property]) -> tuple[Atom, ...]:
-    """The atoms that decide the properties, and what is told of them."""
+    """The atoms of the properties, their triggers, goals and forbidden formulas."""
     parts = (f for p in properties for f in (p.formula, p.trigger, p.goal, p.forbidden) if f is not None)
     return tuple(dict.fromkeys(atom for f in parts for atom in atoms(f)))
 
 
 def asks_for_percepts(wanted: Property) -> bool:
-    """Whether a property looks at the environment (`interpreter.Agent`, "probed")."""
+    """Whether a property observes the environment (`interpreter.Agent`, "probed")."""
     return any(atom.modality is Modality.PERCEPT for atom in atoms(wanted.formula))

@@ -1,4 +1,4 @@
-"""The agent's environment as data: when percepts are drawn, from what, and what is assumed of the draws.
+"""The agent's environment as data: when percepts are drawn, from what, and the assumptions about the draws.
 
     draws: {at_start: true, at_quiescence: once, quiet: [beep]}      # every action but print and the quiet ones draws
     percepts:                                                        # one alternative of each group is drawn
@@ -9,7 +9,7 @@
     fair: [{percept: "arrived(0, 3)", because: "the motion planner always ends"}]
 
 `nothing` is no percept of the group; `keep` leaves the group as it is. A fairness assumption says: if percepts are
-drawn for ever, then draws that contain the percept never cease. Nothing is fair that is not stated.
+drawn infinitely often, then so are draws that contain the percept. No other fairness is assumed.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ class Fairness:
 
 
 Choice = tuple[int, ...]
-"""The alternative drawn last of each group, by its place; -1 before the first draw."""
+"""The index of the alternative drawn last from each group; -1 before the first draw."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,7 +72,7 @@ class Environment:
     groups: tuple[tuple[str, tuple[Struct | None, ...]], ...]
     start: Mapping[str, tuple[int, ...]]
     after: Mapping[str, Mapping[str, tuple[int, ...]]]
-    """Action's name → group → places of the alternatives; KEEP is -1."""
+    """Action's name → group → indices of the alternatives; KEEP is -1."""
     quiet: frozenset[str]
     at_start: bool
     at_quiescence: str
@@ -83,12 +83,12 @@ class Environment:
         return (-1,) * len(self.groups)
 
     def percepts(self, choice: Choice) -> tuple[Struct, ...]:
-        """What is perceived, in the order of the groups."""
+        """The percepts, in the order of the groups."""
         found = (group[at] for (_, group), at in zip(self.groups, choice, strict=True) if at >= 0)
         return tuple(p for p in found if p is not None)
 
     def draws(self, choice: Choice, narrowed: Mapping[str, tuple[int, ...]]) -> tuple[Choice, ...]:
-        """Everything that can be drawn after `choice`."""
+        """Every possible draw after `choice`."""
         options = [
             tuple(dict.fromkeys(now if at < 0 else at for at in narrowed.get(name, range(len(group)))))
             for (name, group), now in zip(self.groups, choice, strict=True)
@@ -96,7 +96,7 @@ class Environment:
         return tuple(product(*options))
 
     def _narrowings(self) -> Iterator[str]:
-        """What is drawn after single actions, and at the start: in one sentence where it is the same."""
+        """The draws after single actions, and at the start: in one sentence if they are the same."""
         alike: dict[tuple[str, ...], list[str]] = {}
         for action, narrowed in (*self.after.items(), *([("the start", self.start)] if self.start else [])):
             drawn: dict[str, list[str]] = {}

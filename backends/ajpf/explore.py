@@ -17,13 +17,13 @@ from .society import Society
 from .tuning import INTENTIONS, STATES
 
 System = Agent | Society
-"""A transition system over states of its own. The core of a state tells whether the environment has just drawn
-(`drawn`), what is on offer (`choice`) and whether the run is over."""
+"""A transition system over states of its own type. The core of a state records whether the environment has just drawn
+(`drawn`), the percepts on offer (`choice`) and whether the run is over."""
 
 
 @dataclass(frozen=True, slots=True)
 class Graph:
-    """States by their numbers; of their successors `after` tells."""
+    """States by their numbers; `after` has their successors."""
 
     system: System
     states: Sequence[Any]
@@ -31,10 +31,10 @@ class Graph:
     offsets: array[int]
     targets: array[int]
     unfinished: str | None = None
-    """Why states are missing: the ones that were not explored any more have no successors. A run that stays within what
-    was explored is still a run of the agent."""
+    """Why states are missing: the unexplored ones have no successors. A run within the explored part is still a run of
+    the agent."""
     settles: bool = False
-    """The states that are missing do not matter to the property that the others were explored for (`lazy`)."""
+    """The missing states do not matter to the property for which the others were explored (`lazy`)."""
 
     def __len__(self) -> int:
         return len(self.states)
@@ -61,7 +61,7 @@ def _backlog(system: System, newest: Sequence[Any]) -> str:
 
 
 class Reduced(Protocol):
-    """A part of the runs that says what all say (`partial.Reduction`)."""
+    """A subset of the runs that is equivalent to all for the properties (`partial.Reduction`)."""
 
     def start(self) -> tuple[Any, ...]: ...
     def successors(self, state: Any, known: Container[Any], /) -> tuple[Any, ...]: ...
@@ -75,8 +75,8 @@ def explore(
     megabytes: int = 4096,
     reduced: Reduced | None = None,
 ) -> Graph:
-    """Every reachable state, breadth first, as far as the bounds let it (`Graph.unfinished`); with `reduced`, those on
-    the runs that it leaves."""
+    """Every reachable state, breadth first, within the bounds (`Graph.unfinished`); with `reduced`, those on the runs
+    that it keeps."""
     deadline = time.monotonic() + seconds
     memory = _memory() + megabytes
     table: Table[Any] = Table()

@@ -1,5 +1,5 @@
 """The files that AJPF takes: properties (.psl), the plan's program (.gwen), agent system (.ail) and one run each
-(.jpf); and a table of what each property stands for. Pure: the same job gives the same bytes."""
+(.jpf); and a table of the meaning of each property. Pure: the same job gives the same bytes."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def export_files(job: Job, setup: Setup, made: Instantiation) -> Mapping[str, st
 
 
 def system_files(setup: Setup, name: str, *, scripted: bool = False) -> dict[str, str]:
-    """The agents and what is around them. The environment's Java class is the plan's, or the one that is beside."""
+    """The agents and their environment. The environment's Java class is the plan's, or the generated one."""
     environment = setup.environment_class or CLASS
     return {
         f"{name}.gwen": program_text(setup.programs),
@@ -47,7 +47,7 @@ def system_files(setup: Setup, name: str, *, scripted: bool = False) -> dict[str
 
 
 def psl_file(properties: Iterable[Property]) -> str:
-    """Lines ``key: formula``. Comments are ASCII and of one line, whatever the contract says."""
+    """Lines ``key: formula``. Comments are ASCII and of one line, whatever the contract contains."""
     lines = []
     for p in properties:
         if p.about:
@@ -95,7 +95,7 @@ def _claims(job: Job, setup: Setup, made: Instantiation) -> str:
     return document(data) + "\n"
 
 
-# Programs as MCAPL's grammar wants them: one form of everything, kinds of goals written out, comments left out
+# Programs as MCAPL's grammar requires: one form of everything, kinds of goals written out, comments left out
 
 _KINDS = (GoalKind.PERFORM, GoalKind.ACHIEVE)
 
@@ -116,7 +116,7 @@ def _agent(program: Program) -> list[str]:
 
 
 def _kinded(plan: Plan) -> Iterator[Plan]:
-    """What is written without a kind is for both: the plan is there twice."""
+    """A trigger without a kind is for both kinds: the plan is written twice."""
     events: Iterable[Event] = (plan.event,)
     if plan.event.is_goal and plan.event.goal is None:
         events = [replace(plan.event, goal=kind) for kind in _KINDS]

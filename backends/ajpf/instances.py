@@ -1,6 +1,6 @@
-"""A guarantee as properties: one instance for each value of its index variables, read as `avow.backends.ajpf.reading`
-says. What is told of them: what no instance covers, and words that neither program nor environment ever has (mostly
-slips of the pen: what no agent of this program could do is forbidden for nothing)."""
+"""A guarantee as properties: one instance for each value of its index variables, read as in
+`avow.backends.ajpf.reading`. Warnings are given for values that no instance covers, and for words that neither program
+nor environment has (mostly typing errors: forbidding what no agent of this program could do shows nothing)."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ from .words import runs, together
 
 @dataclass(frozen=True, slots=True)
 class Claim:
-    """What one guarantee became: its properties, or why it is not covered."""
+    """The result for one guarantee: its properties, or why it is not covered."""
 
     guarantee: str
     properties: tuple[Property, ...] = ()
@@ -43,13 +43,13 @@ class Claim:
     indices: tuple[str, ...] = ()
     """Index variables with their ranges, in words."""
     settled: tuple[str, ...] = ()
-    """Instances that the scenario and the table alone settle, in words."""
+    """Instances that the scenario and the table alone decide, in words."""
     granted: tuple[str, ...] = ()
-    """Rows that are true, or false, of every agent."""
+    """Rows that are true, or false, for every agent."""
     left: tuple[Left, ...] = ()
-    """What it forbids, where a property of the plan stands for that."""
+    """The parts that it forbids and for which a property of the plan stands."""
     hypothesis: str = ""
-    """What is not shown of a guarantee about steps to come."""
+    """The part of a guarantee about future steps that is not shown."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,7 +59,7 @@ class Instantiation:
     unused: tuple[str, ...]
     """Rows of the table that covered nothing."""
     words: Mapping[Formula, str] = field(default_factory=dict)
-    """What each formula that came of a row stands for in the contract."""
+    """The contract's wording for each formula that came from a row."""
 
     @property
     def properties(self) -> tuple[Property, ...]:
@@ -79,7 +79,7 @@ def instances(job: Job, setup: Setup) -> Instantiation:
 
 
 def diagnose(job: Job, setup: Setup, made: Instantiation) -> Iterator[Diagnostic]:
-    """What the table and the instances do not cover, and rows without use: warnings, since the rest can be checked."""
+    """Parts that the table and the instances do not cover, and unused rows: warnings, as the rest can be checked."""
     for claim in made.claims:
         if claim.not_covered is not None:
             yield Diagnostic(
@@ -110,7 +110,7 @@ def diagnose(job: Job, setup: Setup, made: Instantiation) -> Iterator[Diagnostic
 
 
 def _left_out(job: Job, setup: Setup) -> Iterator[Diagnostic]:
-    """Instances of the plan's that do not have all of the scenario's domain."""
+    """The plan's instances that lack part of the scenario's domain."""
     formulas = [job.clause(obligation).formula for obligation in job.obligations]
     bound = (v for f in formulas for t in subterms(f) if isinstance(t, Quantified) for v in t.variables)
     ours: dict[str, Variable] = {}
@@ -232,7 +232,7 @@ def _extra(extra: Extra, keys: set[str]) -> tuple[Property, ...]:
 
 
 def _response(formula: Formula) -> tuple[Formula | None, Formula | None]:
-    """Trigger (and goal) of ``[] (H -> …)``, where H has no temporal operator."""
+    """Trigger (and goal) of ``[] (H -> …)``, if H has no temporal operator."""
     if isinstance(formula, Always) and isinstance(formula.body, psl.Implies) and not psl.is_temporal(formula.body.left):
         right = formula.body.right
         goal = right.body if isinstance(right, Eventually) and not psl.is_temporal(right.body) else None
@@ -241,7 +241,7 @@ def _response(formula: Formula) -> tuple[Formula | None, Formula | None]:
 
 
 def _key(name: str, about: Sequence[str], keys: set[str]) -> str:
-    """ASCII, without colons or spaces: AJPF's property files want it so."""
+    """ASCII, without colons or spaces, as AJPF's property files require."""
     words = [name, *re.findall(r"[0-9]+", about[0] if about else "")]
     base = re.sub(r"[^A-Za-z0-9]+", "_", "_".join(words)).strip("_") or "property"
     key, number = base, 1
@@ -252,8 +252,8 @@ def _key(name: str, about: Sequence[str], keys: set[str]) -> str:
     return key
 
 
-# Words that neither the program nor the environment ever has: mostly slips of the pen. They matter most where something
-# is forbidden: what no agent of this program could do is forbidden for nothing.
+# Words that neither the program nor the environment has: mostly typing errors. They matter most in prohibitions:
+# forbidding what no agent of this program could do shows nothing.
 
 _Word = tuple[str, int]
 _KINDS = {
@@ -267,7 +267,7 @@ _KINDS = {
 
 
 def _unknown_words(job: Job, setup: Setup) -> Iterator[Diagnostic]:
-    """A warning (AJPF134) for each row, property and entry of the environment file that speaks of such a word."""
+    """A warning (AJPF134) for each row, property and entry of the environment file that uses such a word."""
     known = _vocabulary(setup)
     places = [(f"the row “{row.text}”", row.formula, row.span) for row in setup.rows]
     places += [(f"the property '{extra.name}'", extra.formula, extra.span) for extra in setup.extras]
@@ -292,7 +292,7 @@ def _vocabulary(setup: Setup) -> dict[str, set[_Word]]:
 
     percepts = _words(fact for _, group in setup.environment.groups for fact in group if fact is not None)
     told = _words(deed.term.args[2] for deed in deeds if deed.kind is DeedKind.SEND and isinstance(deed.term, Struct))
-    told = told if len(programs) > 1 else set()  # what it is told, an agent may come to believe or want
+    told = told if len(programs) > 1 else set()  # an agent may believe or want what a message tells it
     sent = {("send", 2)} if any(deed.kind is DeedKind.SEND for deed in deeds) else set()
     heads = (rule.head for program in programs for rule in program.rules)
     beliefs = _words((*(b for program in programs for b in program.beliefs), *heads, *done(DeedKind.ADD_BELIEF)))

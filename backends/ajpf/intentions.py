@@ -1,4 +1,4 @@
-"""Intentions: stacks of events with the deeds that are left to do about each, as data."""
+"""Intentions: stacks of events, each with its remaining deeds, as data."""
 
 from __future__ import annotations
 
@@ -9,19 +9,19 @@ from .syntax import NULL, Deed, Event, Goal, GoalKind, Sign, show_event
 from .terms import Bindings, Struct, Term, Var, apply, is_ground, rename, variables
 
 START = Event(Sign.ADD, Struct(":start"))
-"""The bottom of an intention that stands for an initial goal."""
+"""The bottom event of an intention for an initial goal."""
 PERCEPTION = Event(Sign.ADD, Struct(":perception"))
-"""The event of an intention that takes up one percept."""
+"""The event of an intention that handles one percept."""
 
 
 @dataclass(frozen=True, slots=True)
 class Frame:
-    """An event and what is left to do about it; `deeds` is None until a plan is chosen."""
+    """An event and its remaining deeds; `deeds` is None until a plan is chosen."""
 
     event: Event
     deeds: tuple[Deed, ...] | None = None
     fresh: bool = False
-    """A plan was chosen for it, and no deed of it done: where AIL counts the rows of an intention it matters."""
+    """A plan was chosen for it, and no deed of it is done: this matters when AIL counts the rows of an intention."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,7 +68,7 @@ def bind(intention: Intention, bindings: Bindings) -> Intention:
 
 
 def _changed(intention: Intention, change: Callable[[Term], Term]) -> Intention:
-    """The intention with all its terms changed."""
+    """The intention with all its terms mapped."""
 
     def changed(frame: Frame) -> Frame:
         event = replace(frame.event, term=change(frame.event.term))
@@ -81,8 +81,8 @@ def _changed(intention: Intention, change: Callable[[Term], Term]) -> Intention:
 
 
 def tail(intention: Intention) -> tuple[Intention, Goal | None]:
-    """Without its next deed. With its last deed a frame goes, and the goal of a frame that goes is given too: it leaves
-    the goal base."""
+    """The intention without its next deed. A frame is removed with its last deed, and the goal of a removed frame is
+    returned too: it leaves the goal base."""
     top = intention.frames[-1]
     if top.deeds is not None and len(top.deeds) > 1:
         return replace(intention, frames=(*intention.frames[:-1], Frame(top.event, top.deeds[1:]))), None
@@ -91,7 +91,7 @@ def tail(intention: Intention) -> tuple[Intention, Goal | None]:
 
 def post(intention: Intention, goal: Goal) -> Intention:
     """The goal is posted. The deed that posts a goal to be performed becomes one that does nothing, which takes a turn
-    of its own later; one that posts a goal to be achieved is looked at again when that has been dealt with."""
+    of its own later; one that posts a goal to be achieved is examined again when that goal has been handled."""
     top = intention.frames[-1]
     assert top.deeds
     deeds = top.deeds if goal.kind is GoalKind.ACHIEVE else (NULL, *top.deeds[1:])

@@ -1,12 +1,12 @@
 """The Gwendolen reasoning cycle as a transition system: AIL's, as AJPF explores it.
 
 A run is a sequence of jobs. A job either perceives, selects an intention and chooses a plan for its top event, or does
-ONE deed. States are what there is after a job, which is where AJPF looks at its properties. Everything that a state
-holds is a small integer for an interned part (a belief base, an intention), so that states hash fast and the work on a
-part is done once.
+ONE deed. A state is the situation after a job, which is when AJPF evaluates its properties. Everything that a state
+holds is a small integer for an interned part (a belief base, an intention), so that states hash fast and each part is
+processed once.
 
-Where something here surprises, AIL does so: percepts are queued as intentions `-p` and `+p` of their own; a subgoal
-without a plan stands still under an event `-!g`; an initial goal enters the goal base with its first deed.
+Surprising behaviour here is AIL's: percepts are queued as intentions `-p` and `+p` of their own; a subgoal without a
+plan stays blocked under an event `-!g`; an initial goal enters the goal base with its first deed.
 """
 
 from __future__ import annotations
@@ -28,12 +28,11 @@ class Semantics(StrEnum):
     """How percepts become events."""
 
     MCAPL = "mcapl"
-    """AIL's rule "Perceive": each draw queues an intention for everything that was perceived, to drop it, and for
-    everything that is drawn, to add it, also for what persists; ``*f`` wakes when a belief that unifies with f is
-    itself added or dropped."""
+    """AIL's rule "Perceive": each draw queues an intention to drop each old percept, and one to add each drawn percept,
+    also if it persists; ``*f`` wakes when a belief that unifies with f is itself added or dropped."""
     EDGE = "edge"
-    """AIL's rule "Direct Perception with Events": what changes is believed at once, and is an event; and ``*f`` wakes
-    when f has become derivable."""
+    """AIL's rule "Direct Perception with Events": a change is believed at once, and is an event; and ``*f`` wakes when
+    f has become derivable."""
 
 
 class World:
@@ -51,23 +50,23 @@ class World:
         return self._draws(self.environment.before, self.environment.start)
 
     def drawn(self, choice: int) -> tuple[Struct, ...]:
-        """What is on offer, in the order of the environment's groups."""
+        """The percepts on offer, in the order of the environment's groups."""
         return self.environment.percepts(self.choices.all[choice])
 
     def _after(self, choice: int, action: str) -> tuple[int, ...]:
-        """Everything that can be drawn after an action; the draw of an idle agent is that after ``""``."""
+        """Every possible draw after an action; the draw of an idle agent is that after ``""``."""
         return self._draws(self.choices.all[choice], self.environment.after.get(action, {}))
 
     def _draws(self, choice: Choice, narrowed: Mapping[str, tuple[int, ...]]) -> tuple[int, ...]:
         return tuple(self.choices.number(d) for d in self.environment.draws(choice, narrowed))
 
     def _offers(self, choice: int) -> tuple[Struct, ...]:
-        """Percepts in the order in which they are taken up: that of their texts."""
+        """Percepts in the order in which they are handled: that of their texts."""
         return tuple(sorted(set(self.environment.percepts(self.choices.all[choice])), key=plain))
 
 
 class State(NamedTuple):
-    """What there is after a job, written out. All parts by their numbers. A core is a State with an empty queue."""
+    """The situation after a job. All parts are given by their numbers. A core is a State with an empty queue."""
 
     beliefs: int
     goals: int
@@ -80,7 +79,7 @@ class State(NamedTuple):
     last: int
     """The last action, or NONE."""
     choice: int
-    """What the environment offers."""
+    """The draw that the environment offers."""
     new: bool
     """The agent has yet to perceive it."""
     begun: bool
@@ -110,11 +109,11 @@ class State(NamedTuple):
 
 
 BITS = 32
-"""Of a state's number, for its queue."""
+"""The bits of a state's number for its queue."""
 QUEUE = (1 << BITS) - 1
 
 PRINT = "print"
-"""Not an action in the world: it neither draws percepts nor counts as the last action done."""
+"""Not an action on the environment: it neither draws percepts nor counts as the last action done."""
 
 
 class Agent(Mind):
@@ -123,8 +122,8 @@ class Agent(Mind):
     def __init__(
         self, program: Program, environment: Environment | World, semantics: Semantics, *, probed: bool = False
     ) -> None:
-        """`probed`: the properties ask for percepts. AJPF then looks at the environment before the agent does, so that
-        the first percepts are drawn by its look, and the agent perceives them once, not twice."""
+        """`probed`: the properties ask for percepts. AJPF then reads the environment before the agent does, so that its
+        reading draws the first percepts, and the agent perceives them once, not twice."""
         super().__init__(program)
         self.world = environment if isinstance(environment, World) else World(environment)
         self.environment = self.world.environment
@@ -156,7 +155,7 @@ class Agent(Mind):
         return self.cores.all[number >> BITS]
 
     def altered(self, number: int, **fields: Any) -> int:
-        """The number of the state with other values of some fields, but for the queue."""
+        """The number of the state with other values of some fields other than the queue."""
         return self.cores.number(self.core(number)._replace(**fields)) << BITS | number & QUEUE
 
     def minds(self, number: int) -> tuple[int, ...]:
@@ -164,12 +163,12 @@ class Agent(Mind):
         return (number,)
 
     def believed(self, number: int) -> frozenset[Struct]:
-        """All that is believed, without what the agent remembers of its own messages."""
+        """All beliefs, without the agent's memory of its own messages."""
         beliefs = self.beliefs.all[self.core(number).beliefs]
         return frozenset(b for b in beliefs.own | beliefs.perceived if b.functor != SENT)
 
     def did(self, number: int) -> tuple[int, Struct] | None:
-        """Which of `agents` acted last, and its action."""
+        """The index in `agents` of the agent that acted last, and its action."""
         last = self.core(number).last
         return None if last == NONE else (0, self.actions.all[last])
 
@@ -199,7 +198,7 @@ class Agent(Mind):
         return self.numbered(first)
 
     def successors(self, number: int) -> tuple[int, ...]:
-        """Never empty: a run that has ended stays where it is, and nothing is drawn any more."""
+        """Never empty: a run that has ended stays in its state, without further draws."""
         now = self.cores.all[number >> BITS]
         if now.over:
             return (self.altered(number, drawn=False),)
@@ -214,14 +213,14 @@ class Agent(Mind):
         return (self.cycle(number),)
 
     def sees(self, number: int) -> tuple[Struct, ...]:
-        """The percepts on offer that AJPF's P speaks of: those of an action, until the agent has perceived them."""
+        """The percepts on offer to which AJPF's P refers: those of an action, until the agent has perceived them."""
         now = self.core(number)
         return self._offers(now.choice) if now.new and now.begun and not now.over else ()
 
     # The first half of a cycle: perceive, select an intention, choose a plan
 
     def _idle(self, number: int) -> tuple[int, ...]:
-        """There was nothing to do: the environment moves on, or the run is over."""
+        """The agent has nothing to do: the environment draws, or the run is over."""
         when, now = self.environment.at_quiescence, self.core(number)
         if when == "never" or now.waited:
             return (self.altered(number, over=True, drawn=False),)
@@ -235,8 +234,8 @@ class Agent(Mind):
         return tuple(result)
 
     def cycle(self, number: int, draw: int = NONE, *, again: bool = False, letters: tuple[int, ...] = ()) -> int:
-        """`draw` is what the environment has just drawn; `again`: it is perceived once more in the next cycle;
-        `letters` are the intentions that messages make."""
+        """`draw` is the environment's latest draw; `again`: it is perceived once more in the next cycle; `letters` are
+        the intentions that messages create."""
         core, queue = number >> BITS, self.queues.all[number & QUEUE]
         state, posted, changed = self._perceived(core, draw)
         if self.semantics is Semantics.MCAPL:
@@ -247,7 +246,7 @@ class Agent(Mind):
         return self._planned(core, draw, again, current, asleep) << BITS | self.queues.number(queue)
 
     def _perceive(self, core: int, draw: int) -> tuple[State, tuple[int, ...], tuple[int, ...]]:
-        """The core with what was perceived, the intentions that are posted for that, and what has changed."""
+        """The core with the percepts, the intentions that are posted for them, and the changes."""
         state = self.cores.all[core]._replace(drawn=draw != NONE)
         if draw != NONE:
             state = state._replace(choice=draw, begun=True, asleep=False)
@@ -274,7 +273,7 @@ class Agent(Mind):
         return self.cores.number(state._replace(current=chosen, goals=goals, planned=chosen != self.empty))
 
     def _perceptions(self, base: int, choice: int) -> tuple[int, ...]:
-        """Intentions to drop all that is perceived, and to add all that is on offer."""
+        """Intentions to drop all percepts, and to add all that are on offer."""
         old = (of_deed(PERCEPTION, Deed(DeedKind.DROP_BELIEF, p)) for p in self.beliefs.all[base].percepts)
         new = (of_deed(PERCEPTION, Deed(DeedKind.ADD_BELIEF, p)) for p in self._offers(choice))
         return tuple(self.intentions.number(intention) for intention in (*old, *new))
@@ -306,7 +305,7 @@ class Agent(Mind):
     # The second half: one deed
 
     def _outcome(self, core: int, action: int) -> tuple[int, ...]:
-        """The cores that the environment may make of one whose agent has just done the action."""
+        """The possible cores after the agent has done the action."""
         if action == NONE:
             return (core,)
         state, name = self.cores.all[core]._replace(waited=False), self.actions.all[action].functor
@@ -321,15 +320,15 @@ class Agent(Mind):
         return tuple(map(self.cores.number, drawn))
 
     def act(self, number: int) -> tuple[int, int]:
-        """The next deed of the current intention done, and the action that it was; what the world makes of that is not
-        yet in the state."""
+        """The state after the next deed of the current intention, and the action that it was; the environment's
+        reaction is not yet in the state."""
         queue = self.queues.all[number & QUEUE]
         done, core = self._effects(number >> BITS)
         if core == NONE:
             done, queue = self._goal_deed(self.state(number), done)
             core = self._after_deed(number >> BITS, done)
         queue = self._wake(done.beliefs, queue, done.changed) + done.posted
-        if done.suspended:  # it stays the current one for now, unless nothing else can go on
+        if done.suspended:  # it stays the current one for now, unless no other can continue
             if all(self.intentions.all[n].waiting is not None for n in queue):
                 queue = (*queue, done.intention)
                 core = self.cores.number(self.cores.all[core]._replace(current=self.empty, asleep=True))
@@ -337,7 +336,7 @@ class Agent(Mind):
         return core << BITS | self.queues.number(queue), done.action
 
     def _effect(self, core: int) -> tuple[Done, int]:
-        """What the next deed does, and the core after it; NONE if that depends on the queue, as with goals."""
+        """The effect of the next deed, and the core after it; NONE if that depends on the queue, as with goals."""
         state = self.cores.all[core]
         done, deed = self.done(state.beliefs, state.goals, state.current), self.next_deed(state)
         on_goals = deed is not None and deed.kind in (DeedKind.DROP_GOAL, DeedKind.ADD_GOAL)
@@ -353,7 +352,7 @@ class Agent(Mind):
         return deeds[0] if deeds else None
 
     def _goal_deed(self, state: State, done: Done) -> tuple[Done, tuple[int, ...]]:
-        """Goals are added to, and dropped from, what all intentions are at. The answer has the queue in it."""
+        """Goals are added to, and dropped from, those of all intentions. The result includes the queue."""
         intention, deed = self.intentions.all[state.current], self.next_deed(state)
         assert deed is not None
         goal = Goal(deed.term, deed.goal)
@@ -375,13 +374,13 @@ class Agent(Mind):
             return left._replace(goals=left.goals if elsewhere else self.without(left.goals, goal)), state.queue
         for other in sorted((g for g in wanted if g.kind is goal.kind), key=lambda g: plain(g.term)):
             found = unify(goal.term, other.term, {})
-            if found is not None:  # some intention is at it already
+            if found is not None:  # some intention has it already
                 return self.after(state.beliefs, state.goals, intention, found), state.queue
         number = self.number(post(intention, goal))
         return done._replace(goals=self.goals.number(wanted | {goal}), intention=number), state.queue
 
     def _sorted(self, queue: tuple[int, ...]) -> tuple[int, ...]:
-        """Those that can go on in their order, then those that wait in theirs."""
+        """The intentions that can continue in their order, then those that wait in theirs."""
         intentions = self.intentions.all
         ready = [n for n in queue if intentions[n].waiting is None]
         waiting = [n for n in queue if intentions[n].waiting is not None]
@@ -390,7 +389,7 @@ class Agent(Mind):
     # Parts
 
     def own(self, number: int) -> int:
-        """The state without what is the environment's, or the scheduler's."""
+        """The state without the environment's and the scheduler's parts."""
         return self._owned(number >> BITS) << BITS | number & QUEUE
 
     def _own(self, core: int) -> int:
@@ -398,7 +397,7 @@ class Agent(Mind):
         return self.cores.number(own._replace(drawn=False))
 
     def _wake(self, base: int, queue: tuple[int, ...], changed: tuple[int, ...]) -> tuple[int, ...]:
-        """Those that waited for what has changed go on."""
+        """The intentions that waited for the changes continue."""
         return tuple([self._woken(base, n, changed) for n in queue]) if changed else queue
 
     def _after_change(self, base: int, number: int, changed: tuple[int, ...]) -> int:

@@ -1,6 +1,6 @@
 """The plan's environment as a Java class for AIL. Pure: the same environment gives the same text.
 
-The class follows AIL's contract for environments (percepts are given once until they change; `done` is asked when the
+The class follows AIL's contract for environments (percepts are given once until they change; `done` is called when the
 agent sleeps), and draws through AJPF's choices, so that AJPF explores every draw.
 """
 
@@ -23,17 +23,17 @@ CLASS = "AvowEnvironment"
 SCRIPT = "script.txt"
 """The file that a scripted environment reads its choices from."""
 MARK = "avow: "
-"""Starts the lines of output in which a scripted environment tells what happens."""
+"""The prefix of the output lines in which a scripted environment reports events."""
 
 
 @dataclass(frozen=True, slots=True)
 class Script:
-    """One run's draws, and the names of the agents that take turns where the scheduler has a choice."""
+    """One run's draws, and the names of the agents that take turns when the scheduler has a choice."""
 
     draws: Sequence[Choice]
     turns: Sequence[str] = ()
     probed: bool = False
-    """The environment looks for percepts before the agents do, as AJPF does for properties that ask for them."""
+    """The environment draws percepts before the agents ask, as AJPF does for properties that use them."""
 
     def text(self) -> str:
         draws = [f"draw {' '.join(map(str, choice))}" for choice in self.draws]
@@ -52,8 +52,8 @@ def runs_class() -> str:
 
 
 def environment_class(environment: Environment, *, agents: int = 1, scripted: bool = False) -> str:
-    """The class's source. A `scripted` one chooses what a `Script` beside it says and nothing else, and tells what
-    happens. Several agents have the scheduler that `DefaultEnvironment` gives them; in a script, one that knows it."""
+    """The class's source. A `scripted` one makes exactly the choices of a `Script` beside it, and reports the events.
+    Several agents have the scheduler of `DefaultEnvironment`; in a script, one that follows the script."""
     groups = environment.groups
     everything = {group: tuple(range(len(words))) for group, words in groups}
     templates = Templates(

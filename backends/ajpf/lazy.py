@@ -1,5 +1,5 @@
-"""The part of a state space that one property needs: runs are followed only as long as they may still break it, and a
-prefix that no continuation can mend ends the search. So an agent without bounds may have its answer."""
+"""The part of a state space that one property needs: runs are followed only as long as they may still violate it, and a
+bad prefix ends the search. So an unbounded agent may still get an answer."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from .tuning import TAIL
 
 
 class _Part:
-    """States by their numbers, with what was found of their successors."""
+    """States by their numbers, with the successors found so far."""
 
     def __init__(self, system: System) -> None:
         self.system = system
@@ -44,8 +44,8 @@ class _Part:
 
 
 def open_part(system: System, wanted: Property, states: int, seconds: float) -> Graph | None:
-    """The states in which the property is neither kept nor broken for good, and those next to them: enough to decide
-    it. None where the bounds do not let it be found. Raises ltl.TooLarge, TooDeep."""
+    """The states in which the property is neither satisfied nor violated for good, and their neighbours: enough to
+    decide it. None if the bounds are met first. Raises ltl.TooLarge, TooDeep."""
     if system.environment.fair:
         return None
     deadline = time.monotonic() + seconds
@@ -85,7 +85,7 @@ def open_part(system: System, wanted: Property, states: int, seconds: float) -> 
 
 
 def _followed(part: _Part, number: int) -> bool:
-    """Whether the run that takes the first way everywhere comes back to a state."""
+    """Whether the run that always takes the first successor comes back to a state."""
     seen: set[int] = set()
     while number not in seen and len(seen) < TAIL:
         seen.add(number)
@@ -94,7 +94,7 @@ def _followed(part: _Part, number: int) -> bool:
 
 
 def _lost(automaton: Automaton[Formula]) -> frozenset[int]:
-    """Nodes that accept whatever comes: a run that reaches one breaks the property for good."""
+    """Nodes that accept every continuation: a run that reaches one violates the property for good."""
     return frozenset(
         n
         for n, following in enumerate(automaton.successors)

@@ -1,7 +1,7 @@
-"""A Gwendolen program that runs: what is perceived comes from outside, and so does what becomes of its actions.
+"""A running Gwendolen program: its percepts come from outside, and so do the results of its actions.
 
-The reasoning cycle is that of `interpreter`, which the properties are checked with; here the world is not drawn from
-alternatives but told.
+The reasoning cycle is that of `interpreter`, with which the properties are checked; here the percepts are given, not
+drawn from alternatives.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ class Endless(RuntimeError):  # noqa: N818 - it says what the program is
 
 
 class _Told(World):
-    """What there is to perceive, as it was told."""
+    """The percepts, as they were given."""
 
     def __init__(self) -> None:
         self.shown: Table[tuple[Struct, ...]] = Table()
@@ -34,17 +34,17 @@ class _Told(World):
 
 
 class Running:
-    """The first agent of a file, at work."""
+    """The first agent of a file, running."""
 
     def __init__(self, path: Path | str) -> None:
-        """Raises Rejected where the file is no program."""
+        """Raises Rejected if the file is not a program."""
         self._world = _Told()
         self._agent = Agent(read_system(Path(path))[0], self._world, Semantics.MCAPL)
         self._state = self._agent.first()
 
     def perceive(self, percepts: Iterable[str]) -> tuple[str, tuple[str, ...]] | None:
-        """All that there is to perceive now; the program goes on until it acts (the action's name and arguments) or has
-        nothing to do (None). Raises Endless, and ValueError for what is no percept."""
+        """Give all current percepts; the program continues until it acts (the action's name and arguments) or has
+        nothing to do (None). Raises Endless, and ValueError if a text is not a percept."""
         found = []
         for text in percepts:
             fact = parse_fact(text)

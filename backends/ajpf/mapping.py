@@ -1,7 +1,7 @@
 """From contract formulas to properties of the agent, through the table that a person wrote in the plan.
 
-Each row says which agent formula stands for which contract formula (the paper's mapping table). What no row covers, and
-what the scenario does not decide, is reported, never dropped.
+Each row says which agent formula stands for which contract formula (the paper's mapping table). Parts that no row
+covers, and parts that the scenario does not decide, are reported, never dropped.
 """
 
 from __future__ import annotations
@@ -58,14 +58,14 @@ class Row:
 
 @dataclass(frozen=True, slots=True)
 class Unit:
-    """What one row covered, mapped; `output` where the row speaks of an output."""
+    """The part that one row covered, mapped; `output` if the row is about an output."""
 
     formula: Formula
     output: bool
     forbids: bool = False
-    """It says only what an output must *not* be: "eventually not" would be met by an agent that does just that."""
+    """It only excludes values of an output: "eventually not" would be met by an agent that takes the excluded value."""
     term: Term = field(default=TRUE, compare=False)
-    """What was covered, without its negation."""
+    """The covered part, without its negation."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,7 +79,7 @@ class Junction:
 Mapped = Unit | Junction
 
 Decide = Callable[[Term], bool | None]
-"""The truth of a closed formula in the plan's scenario, or None where the scenario does not say."""
+"""The truth of a closed formula in the plan's scenario, or None if the scenario does not decide it."""
 
 Range = Callable[[Variable], Sequence[int] | None]
 """The finite range of a quantified index variable, or None."""
@@ -96,12 +96,12 @@ class Mapper:
     used: set[str] = field(default_factory=set)
     """The texts of the rows that covered something."""
     expanded: dict[str, tuple[int, ...]] = field(default_factory=dict)
-    """Index variables quantified within formulas, and the finite ranges that they were given."""
+    """Index variables quantified within formulas, and their finite ranges."""
     granted: set[str] = field(default_factory=set)
-    """Rows that covered something with a formula that is true (or false) of every agent."""
+    """Rows that covered something with a formula that is true (or false) for every agent."""
     constants: dict[Formula, bool | None] = field(default_factory=dict)
     words: dict[Formula, str] = field(default_factory=dict)
-    """Formula of the agent → what it stands for, as covered in the contract: for counterexamples."""
+    """Formula of the agent → its meaning, as covered in the contract: for counterexamples."""
 
     def map(self, term: Term) -> Mapped:
         """A formula in normal form. Raises NotCovered."""
@@ -153,7 +153,7 @@ class Mapper:
         return None
 
     def _at_once(self, term: Term) -> Mapped | None:
-        """By one row, or because the term is true or false of every agent."""
+        """By one row, or because the term is true or false for every agent."""
         made = self._whole(term)
         if made is not None:
             return made
@@ -198,7 +198,7 @@ class Mapper:
         return self.map(disjunction(cases) if exists else conjunction(cases))
 
     def _block(self, term: Quantified) -> Mapped:
-        """``exists(x | P and Q)``: rows may not tear apart what x joins."""
+        """``exists(x | P and Q)``: rows may not separate parts that share x."""
         names = {v.name for v in term.variables}
         items = conjuncts(term.body)
         static = [i for i in items if not bound_names(i) - names and not _has_output(i)]
@@ -232,7 +232,7 @@ class Mapper:
             self.granted.add(row.text)
             return YES if truth else NO
         said = row.say(values)
-        if self.words.setdefault(formula, said) != said:  # the row forgets an index: one formula for several
+        if self.words.setdefault(formula, said) != said:  # the row omits an index: one formula for several
             self.words[formula] = row.say({})
         body = term.body if isinstance(term, Not) else term
         return Unit(formula, _has_output(term), _only_forbids(term), body)
@@ -257,7 +257,7 @@ def _has_output(term: Term) -> bool:
 
 
 def _only_forbids(term: Term) -> bool:
-    """Of a formula in normal form: whether all that it says of outputs is what they are not."""
+    """Whether a formula in normal form only excludes values of outputs."""
     match term:
         case Not(body=body):
             return _has_output(body)
@@ -265,7 +265,7 @@ def _only_forbids(term: Term) -> bool:
             return _has_output(term) and all(_only_forbids(item) for item in items if _has_output(item))
         case Quantified(body=body):
             return _only_forbids(body)
-        case _:  # an atom demands it
+        case _:  # an atom requires a value
             return False
 
 
@@ -300,7 +300,7 @@ def to_formula(mapped: Mapped) -> Formula:
 
 
 def clauses(mapped: Mapped, limit: int = 64) -> list[tuple[Unit, ...]]:
-    """Conjunctive normal form. Raises NotCovered where it is too large."""
+    """Conjunctive normal form. Raises NotCovered if it is too large."""
     if isinstance(mapped, Unit):
         return [(mapped,)]
     if mapped.all:
@@ -318,11 +318,11 @@ def substituted(term: Term, values: Mapping[Variable, int]) -> Term:
     return substitute(term, {v: Literal(n, v.sort) for v, n in values.items()}) if values else term
 
 
-# What the plan's finite scenario decides
+# Decisions by the plan's finite scenario
 
 
 class Decider:
-    """Decides closed formulas over interpreted inputs. Places outside a function's table have no value there: no number
+    """Decides closed formulas over interpreted inputs. Arguments outside a function's table have no value: no number
     that a contract can name equals it."""
 
     def __init__(self, job: Job) -> None:
@@ -368,8 +368,8 @@ def domain_of(variable: Variable, scenario: Scenario | None) -> Sequence[int] | 
 
 
 def _interpretations(node: Node, scenario: Scenario) -> dict[str, Value]:
-    """A relation holds at the table's rows; a function to whole numbers takes its last column as value there. (Of other
-    sorts there is no value to stand for "none".)"""
+    """A relation holds at the table's rows; a function to whole numbers takes its last column as value there. (Other
+    sorts have no value for "none".)"""
     found = {variable.qualified: value for variable, value in interpretation(node, scenario).items()}
     for port in node.inputs:
         sort = port.sort

@@ -48,7 +48,7 @@ def match(pattern: Term, term: Term, names: frozenset[str], binding: Binding) ->
 def choose(
     patterns: Sequence[Term], terms: Sequence[Term], names: frozenset[str], binding: Binding
 ) -> Iterator[tuple[Binding, tuple[int, ...]]]:
-    """Every way to match each pattern with a different term; with the places of the terms that were taken."""
+    """Every way to match each pattern with a different term; with the indices of the terms used."""
     if not patterns:
         yield binding, ()
         return

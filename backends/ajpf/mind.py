@@ -1,4 +1,4 @@
-"""What an agent has in mind, in interned parts, and what choosing a plan or doing one deed makes of it."""
+"""An agent's mental state, in interned parts, and the effect on it of choosing a plan or doing one deed."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ NONE = -1
 
 
 class Table(dict[T, int]):
-    """Numbers for things, in order of appearance; the thing of a number is in `all`. A number that is known is found
-    without a call of a Python function."""
+    """Numbers for values, in order of appearance; the value of a number is in `all`. A known number is found without a
+    call of a Python function."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -34,7 +34,7 @@ class Table(dict[T, int]):
 
 
 class Done(NamedTuple):
-    """What one deed does, as far as it depends on beliefs, goals and the intention alone."""
+    """The effect of one deed, as far as it depends only on beliefs, goals and the intention."""
 
     beliefs: int
     goals: int
@@ -109,7 +109,7 @@ class Mind:
     def effect(self, base: int, goals: int, number: int) -> Done:
         intention = self.intentions.all[number]
         top = intention.frames[-1]
-        if not top.deeds:  # an event -!g that no plan takes up
+        if not top.deeds:  # an event -!g that no plan handles
             return Done(base, goals, number)
         deed, beliefs = top.deeds[0], self.beliefs.all[base]
         term = computed(deed.term)
@@ -140,7 +140,7 @@ class Mind:
             case DeedKind.LOCK | DeedKind.UNLOCK:
                 locked = replace(intention, locked=deed.kind is DeedKind.LOCK)
                 return self.after(base, goals, locked, {})
-            case DeedKind.ADD_GOAL | DeedKind.DROP_GOAL | DeedKind.NULL:  # goals are looked at with the queue in view
+            case DeedKind.ADD_GOAL | DeedKind.DROP_GOAL | DeedKind.NULL:  # goals need the queue
                 return self.after(base, goals, intention, {})
             case _:
                 assert_never(deed.kind)
@@ -180,8 +180,8 @@ class Mind:
     def drop_goal(
         self, base: int, goals: int, intention: Intention, queue: tuple[int, ...], goal: Goal
     ) -> tuple[Done, tuple[int, ...]]:
-        """The goal is dropped from the intention that drops it, with all that stands on it and the deed that posted it,
-        else from all others; with it go the goals of the intention that it was dropped from last."""
+        """The goal is dropped from the intention that drops it, with all frames above it and the deed that posted it,
+        else from all others; the goals of the intention that it was dropped from last are dropped too."""
         goals = self.without(goals, goal)
         cut = _cut(intention, goal)
         if cut is not None:
@@ -231,8 +231,8 @@ class Mind:
 
 
 def _kind_met(trigger: Event, event: Event) -> GoalKind | None:
-    """The kind that the event's goal has for a plan with this trigger; None if the plan is none for it. AIL matches a
-    ground event against a trigger with variables term by term, whatever their kinds, and goes on with the plan's. A
+    """The kind that the event's goal has for a plan with this trigger; None if the plan does not fit. AIL matches a
+    ground event against a trigger with variables term by term, whatever their kinds, and continues with the plan's. A
     trigger without a kind is one to perform, then one to achieve."""
     if is_ground(event.term) and not is_ground(trigger.term):
         return trigger.goal or GoalKind.PERFORM
@@ -246,7 +246,7 @@ def _key(event: Event) -> tuple[Sign, bool, str, int]:
 
 
 def _trigger_index(plans: Iterable[Plan]) -> dict[tuple[Sign, bool, str, int], list[Plan]]:
-    """Plans by what triggers them, in file order."""
+    """Plans by their triggers, in file order."""
     index: dict[tuple[Sign, bool, str, int], list[Plan]] = {}
     for plan in plans:
         index.setdefault(_key(plan.event), []).append(plan)
@@ -254,8 +254,8 @@ def _trigger_index(plans: Iterable[Plan]) -> dict[tuple[Sign, bool, str, int], l
 
 
 def _cut(intention: Intention, goal: Goal) -> Intention | None:
-    """The intention below the first frame that is at the goal. Where only the goal's kind or the event's sign differ,
-    all of the intention; None if nothing fits."""
+    """The intention below the first frame with the goal. If only the goal's kind or the event's sign differ, all of the
+    intention; None if no frame fits."""
     for at, frame in enumerate(intention.frames):
         event = frame.event
         if event.is_goal and event.sign is Sign.ADD and event.goal is goal.kind and _fits(goal, event.term):
@@ -274,5 +274,5 @@ def _posts(intention: Intention, goal: Goal) -> bool:
 
 
 def _named(term: Term) -> Struct:
-    """What enters the belief base or the world is no mere variable."""
+    """A term that enters the belief base or the environment is not a mere variable."""
     return term if isinstance(term, Struct) else Struct("_")

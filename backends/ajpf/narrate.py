@@ -1,4 +1,4 @@
-"""A run of an agent, told: by the same interpreter whose every run is checked."""
+"""A run of an agent in words: by the same interpreter whose every run is checked."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ class Told:
     """One step of a run. `what` is a sentence; the others are texts of terms."""
 
     agent: str
-    """Whose step it is; empty where there is one agent only."""
+    """The agent whose step it is; empty if there is only one agent."""
     what: str
     offered: tuple[str, ...] | None = None
-    """What the environment has just drawn; None where it did not draw."""
+    """The environment's latest draw; None if it did not draw."""
     believed: tuple[str, ...] = ()
     believed_no_more: tuple[str, ...] = ()
     action: str | None = None
@@ -42,7 +42,7 @@ class Told:
 
 
 def narrated(system: System, seed: int, steps: int) -> Iterator[Told]:
-    """At most so many steps of one run; where the environment has a choice, the seed decides. Raises Crash, TooDeep."""
+    """At most so many steps of one run; if the environment has a choice, the seed decides. Raises Crash, TooDeep."""
     rng = Random(seed)
     state: Any = system.start()[0]
     for _ in range(steps):
@@ -86,7 +86,7 @@ def _deed(agent: Agent, state: State) -> str:
             return f"does {show_deed(deed)}"
         case DeedKind.WAIT | DeedKind.WAIT_NOT:
             return f"looks whether to wait: {show_deed(deed)}"
-        case _:  # acts, and changes of what it believes and wants
+        case _:  # actions, and changes of beliefs and goals
             return f"carries out {show_deed(deed)}"
 
 

@@ -32,7 +32,7 @@ from .tuning import DEFAULT_STATES, INDEX_VALUES
 
 _BINDER = re.compile(r"\b(?:forall|exists|exists_unique)\s*\(([^|;]*)[|;]")
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*'*")
-"""A pattern's own quantifiers bind names that the clauses use too: these are no free variables of it."""
+"""A pattern's own quantifiers bind names that the clauses use too: these are not free variables of it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,12 +49,12 @@ class Extra:
     """Index variables that it is instantiated over, with their ranges."""
     span: Span
     forbids: Term | None = None
-    """It stands for what the guarantee forbids by this formula (in normal form), which "eventually" cannot say."""
+    """It stands for what the guarantee forbids by this formula (in normal form), which "eventually" cannot express."""
 
 
 @dataclass(frozen=True, slots=True)
 class Setup:
-    """The options, usable."""
+    """The options, checked."""
 
     programs: tuple[Program, ...]
     """The agents of the system."""
@@ -194,8 +194,8 @@ class _OptionsReader:
         return {name: sort for name, sort in found.items() if name not in ports}
 
     def domains(self) -> dict[str, tuple[int, ...]]:
-        """The scenario's domains of the variables that the node's clauses quantify over: what they range over where the
-        plan's `instances` say nothing."""
+        """The scenario's domains of the variables that the node's clauses quantify over: their ranges if the plan's
+        `instances` give none."""
         scenario = self.job.system.plan.scenario
         variables = (Variable(Role.BOUND, name, sort) for name, sort in self.sorts().items() if is_index(sort))
         return {v.name: tuple(found) for v in variables if (found := domain_of(v, scenario))}

@@ -1,4 +1,4 @@
-"""Reads Gwendolen programs. Whatever the text is, the answer is a `Program` or located diagnostics."""
+"""Reads Gwendolen programs. Any text gives a `Program` or located diagnostics."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def parse_fact(text: str) -> Struct | None:
 
 
 def parse_system(text: str, file: str) -> tuple[Program, ...]:
-    """All agents of a file. Raises Rejected with the place of what does not belong, or cannot be run."""
+    """All agents of a file. Raises Rejected with the place of a syntax error, or of what cannot be run."""
     builder = _Builder(file)
     try:
         tree = _grammar().parse(text, start="start")
@@ -140,7 +140,7 @@ class _Builder(Transformer):  # type: ignore[misc]
         if depth > TERM_DEPTH:
             raise Rejected(Diagnostic("AJPF102", f"a term nested more than {TERM_DEPTH} deep", self.span(meta)))
         made = Struct(str(parts[0]), args)
-        self.depths[id(made)] = (depth, made)  # the reference keeps the id from being used again
+        self.depths[id(made)] = (depth, made)  # the reference keeps the id from being reused
         return made
 
     def variable(self, parts: list[Token]) -> Var:
@@ -171,7 +171,7 @@ class _Builder(Transformer):  # type: ignore[misc]
             self.problems.append(Diagnostic("AJPF103", message, self.span(meta)))
 
     def several(self, parts: list[Any]) -> tuple[Any, ...]:
-        """All that is there."""
+        """All sections."""
         return tuple(p for p in parts if p is not None)
 
     beliefs = rules = goals = plans = deeds = start = several
@@ -213,7 +213,7 @@ class _Builder(Transformer):  # type: ignore[misc]
         return Condition(parts[1], parts[0] is None, is_goal=True, goal=parts[2])
 
     def sent(self, parts: list[Any]) -> Condition:
-        """Without a sender: the agent itself; it remembers nobody else's messages."""
+        """Without a sender: the agent itself; it does not remember others' messages."""
         denied, to, sender, force, content = parts
         term = Struct(SENT, (to, sender or self.anonymous([]), _force(force), content))
         return Condition(term, denied is None)

@@ -1,16 +1,16 @@
-"""Partial order reduction for several agents: of turns that are independent, one order instead of all.
+"""Partial order reduction for several agents: independent turns are followed in one order instead of all.
 
-AIL lets an agent go on till something has changed for anybody, and then any agent that is awake: these *turns* are the
+AIL lets an agent run until something has changed for any agent, and then any agent that is awake: these *turns* are the
 transitions here. A turn is *local* if it ends because the agent falls asleep or sends a message, draws no percepts, and
-shows nothing of what the properties ask, from its first job to its last. Of a state where any agent may be next, only
+does not change the properties' atoms, from its first job to its last. From a state where any agent may be next, only
 the turns of some agents are followed (an ample set: Clarke, Grumberg, Peled, "Model Checking", chapter 10) if
 
-- these turns are local, and nothing that the other agents can ever do meanwhile bears on them: no message to one of
-  these agents or to whom their turns send one, and no draw of percepts, which all agents perceive;
-- they lead to states that were not known before, so that no agent is put off for ever round a cycle. (Turns that
-  only end asleep make no cycle: where no agent ever sends anything, this need not be looked at.)
+- these turns are local, and independent of everything that the other agents can do meanwhile: no message to one of
+these agents or to a receiver of their messages, and no draw of percepts, which all agents perceive;
+- they lead to states that were not known before, so that no agent is postponed for ever round a cycle. (Turns that only
+end asleep make no cycle: if no agent ever sends anything, this need not be checked.)
 
-What properties without "next" say of the runs that are left is what they say of all. One agent's intentions never
+Properties without "next" hold on the remaining runs if and only if they hold on all. One agent's intentions never
 interleave in AIL, so that for one agent there is nothing to reduce.
 """
 
@@ -37,14 +37,14 @@ from .tuning import TURN
 
 @dataclass(frozen=True, slots=True)
 class Turn:
-    """A local turn: where it ends, and whom it sends a message."""
+    """A local turn: the state where it ends, and the receiver of its message, if any."""
 
     end: Common
     to: int | None
 
 
 class Reduction:
-    """For properties that speak of `atoms`; raises ValueError where they or the agents allow none."""
+    """A reduction for properties over `atoms`. Raises ValueError if they or the agents allow none."""
 
     def __init__(self, society: Society, atoms: Sequence[Atom]) -> None:
         environment = society.environment
@@ -66,8 +66,8 @@ class Reduction:
         self._sends = any(self._senders)
 
     def key(self, state: Common) -> Common:
-        """The state without what makes no difference to any run from here on, nor to what the properties see. (Who
-        slept last has a look of its own at the end of a run; of that no property sees anything.)"""
+        """The state without the parts that matter neither to any run from here on nor to the properties. (The agent
+        that slept last has one more cycle at the end of a run; no property depends on it.)"""
         if state.changed and any(state.awake):
             state = state._replace(turn=0)
         if not self.actions_show:
@@ -88,7 +88,7 @@ class Reduction:
         return tuple(dict.fromkeys(map(self.key, moves)))
 
     def _ample(self, state: Common, known: Container[Common]) -> tuple[int, ...] | None:
-        """The agents whose turns are enough; None for all."""
+        """The agents whose turns suffice; None for all."""
         if not state.changed or not state.begun or state.over or sum(state.awake) < 2:
             return None
         turns = {place: self.turn(state, place) for place in self.society.turns(state)}
@@ -105,8 +105,8 @@ class Reduction:
         return best
 
     def _group(self, first: int, turns: dict[int, Turn | None]) -> tuple[int, ...] | None:
-        """The awake agents among those that `first` depends on, and they on each other; None if these are all, or one
-        of their turns is not local."""
+        """The awake agents among those that `first` depends on, directly or not; None if these are all, or one of their
+        turns is not local."""
         group, open_ends = {first}, [first]
         while open_ends:
             place = open_ends.pop()
@@ -153,7 +153,7 @@ class Reduction:
         return agent.next_deed(agent.core(state.minds[place]))
 
     def _shown(self, state: Common, place: int) -> int:
-        """What the properties see of the agent."""
+        """The properties' atoms that hold for the agent."""
         return self._labels[place].of(state.minds[place])
 
     def _silently(self, deed: Deed) -> bool:
@@ -169,7 +169,7 @@ class Reduction:
         name = "send" if deed.kind is DeedKind.SEND else deed.term.functor if isinstance(deed.term, Struct) else ""
         return self._acts(deed) and name not in self.society.environment.quiet and not self.silent
 
-    # What an agent may ever do, by its plans
+    # What an agent may do, by its plans
 
     def _deeds(self, place: int) -> list[Deed]:
         return [deed for plan in self.society.agents[place].program.plans for deed in plan.deeds]
@@ -185,8 +185,8 @@ class Reduction:
 
 
 def reduction(system: System, properties: Sequence[Property]) -> Reduction | None:
-    """One that is sound for these properties, if there is any. Whether what is forbidden is the answer to an occasion
-    is asked of all ways that there are (`Checker.check`)."""
+    """A reduction that is sound for these properties, if any. Whether a forbidden formula is the answer to an occasion
+    depends on all paths (`Checker.check`)."""
     if not isinstance(system, Society) or any(p.forbidden is not None for p in properties):
         return None
     try:
@@ -196,7 +196,7 @@ def reduction(system: System, properties: Sequence[Property]) -> Reduction | Non
 
 
 def unfolded(reduction: Reduction, graph: Graph, lasso: Lasso) -> tuple[Graph, Lasso]:
-    """A run of the reduced graph with all that its states leave out (`Reduction.key`): a graph of this run alone."""
+    """A run of the reduced graph with the parts that its states omit (`Reduction.key`): a graph of this run alone."""
     society, key = reduction.society, reduction.key
 
     def step(options: Sequence[Common], number: int) -> Common:

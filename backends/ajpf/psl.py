@@ -1,7 +1,7 @@
-"""AJPF's property specification language: formulas, and how they are written so that AJPF reads what is meant.
+"""AJPF's property specification language: formulas, and how they are printed so that AJPF reads them as intended.
 
 AJPF's grammar has traps: ``||`` binds tighter than ``&``, ``->`` associates to the left, ``<>[]p`` loses its inner
-operator. The printer brackets whatever is no proposition. As automata, properties are over *leaves*: the greatest parts
+operator. The printer brackets everything but propositions. As automata, properties are over *leaves*: the largest parts
 without temporal operators, which are tests of one state.
 """
 
@@ -21,7 +21,7 @@ from .terms import Struct
 from .terms import show as show_fact
 
 KEYWORDS = frozenset({"A", "E", "U", "R", "B", "G", "F", "I", "D", "P", "T", "ItD"})
-"""Words of the language: an agent may not be called so."""
+"""Words of the language: an agent may not have such a name."""
 
 AGENT_NAME = re.compile(r"[a-z][A-Za-z0-9_]*\Z")
 
@@ -111,7 +111,7 @@ def parts(formula: Formula) -> tuple[Formula, ...]:
 
 
 def with_atoms(formula: Formula, change: Callable[[Atom], Formula]) -> Formula:
-    """The formula, with each of its atoms changed."""
+    """The formula, with each of its atoms mapped."""
     if isinstance(formula, Atom | Truth):
         return change(formula) if isinstance(formula, Atom) else formula
     made = tuple(with_atoms(part, change) for part in parts(formula))
@@ -171,7 +171,7 @@ _WRITTEN = {
 
 
 def show(formula: Formula) -> str:
-    """As AJPF reads it: brackets stand around whatever is no proposition."""
+    """As AJPF reads it: everything but a proposition is in brackets."""
     match formula:
         case Atom(modality=modality, agent=agent, term=term):
             return f"{modality}({f'{agent}, ' if agent else ''}{show_fact(term)})"
@@ -197,7 +197,7 @@ def show_template(formula: Formula) -> str:
 
 
 def automaton_of(formula: Formula) -> Automaton[Formula]:
-    """The automaton that accepts just the runs on which the formula holds. Raises TooLarge."""
+    """The automaton that accepts exactly the runs on which the formula holds. Raises TooLarge."""
     return ltl.build(_normal(formula, True))
 
 

@@ -1,4 +1,4 @@
-"""Reads properties as a person writes them in a plan, and refuses what AJPF would silently read as something else.
+"""Reads properties as written in a plan, and refuses those that AJPF would silently read as something else.
 
 Beyond AJPF's syntax, arguments may be index variables and ``i + 1`` of them, to be replaced for each instance.
 """
@@ -23,7 +23,7 @@ _UNARY: Mapping[str, tuple[Callable[[Formula], Formula], int]] = {
     **dict.fromkeys(("<>", "E"), (psl.Eventually, 2)),
     "~": (psl.Not, 1),
 }
-"""With how loosely AJPF binds it: directly within, it takes only what binds tighter."""
+"""With its level of precedence in AJPF: its direct operands must bind tighter."""
 
 
 class Malformed(Exception):  # noqa: N818 - it names the text
@@ -131,7 +131,7 @@ class _Parser:
                 term = self.struct(depth)
                 self.take(")")
                 return Atom(Modality(token.text), agent, term)
-            case _:  # nothing begins so: reported below
+            case _:  # no formula begins so: reported below
                 shown = repr(token.text) if token.text else "the end"
                 raise Malformed(f"expected a proposition such as B(agent, fact), found {shown}", token.offset)
 
@@ -172,7 +172,7 @@ class _Parser:
 
 
 def instantiate(formula: Formula, values: Mapping[str, int]) -> Formula:
-    """The formula with its index variables replaced. Raises Malformed where something is left that AJPF cannot read."""
+    """The formula with its index variables replaced. Raises Malformed if a part remains that AJPF cannot read."""
 
     def instance(atom: Atom) -> Atom:
         made = _instantiate(atom.term, values)

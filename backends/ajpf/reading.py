@@ -1,8 +1,8 @@
-"""How an implication of the contract is read in time: what is demanded as ``[] (H -> <> C)``, what is forbidden as
+"""How an implication of the contract is read in time: demands as ``[] (H -> <> C)``, prohibitions as
 ``[] (H -> [] ~C)``.
 
-H and C are the antecedent and the consequent, mapped. Where the consequent speaks of inputs too, these belong
-to the moment of the trigger and move to H. Alternatives in H give a property each, each with a vacuity of its own.
+H and C are the antecedent and the consequent, mapped. If the consequent is about inputs too, these belong to the moment
+of the trigger and move to H. Alternatives in H give a property each, each with a vacuity of its own.
 """
 
 from __future__ import annotations
@@ -27,12 +27,12 @@ from .tuning import ALTERNATIVES
 
 @dataclass(frozen=True, slots=True)
 class Left:
-    """What the guarantee forbids, in the contract's words, and the plan's property that stands for it."""
+    """A prohibition of the guarantee, in the contract's words, and the plan's property that stands for it."""
 
     forbidden: str
     extra: str
     ban: Formula
-    """That it must not be at the moment of the trigger: the least that the guarantee asks."""
+    """That it must not hold at the moment of the trigger: the least that the guarantee requires."""
 
 
 def read_properties(
@@ -43,8 +43,8 @@ def read_properties(
     stand_ins: Sequence[Extra],
     timing: Timed | None = None,
 ) -> Iterator[Property | Left]:
-    """The properties, without keys; nothing where the consequent is true anyway. With `timing`, what is demanded is of
-    steps to come."""
+    """The properties, without keys; empty if the consequent is true anyway. With `timing`, the demand is about future
+    steps."""
     left, right = shape(antecedent), shape(consequent)
     if left == FALSE:
         yield _eventually(psl.FALSE, psl.TRUE)
@@ -90,20 +90,20 @@ def _eventually(trigger: Formula, goal: Formula) -> Property:
 
 
 def _never(trigger: Formula, kept: Formula) -> Property:
-    """What a guarantee forbids must not come from the trigger on. ("Eventually not" would ask next to nothing: the
-    agent could do what is forbidden, and something else before or afterwards.)"""
+    """A forbidden formula must not hold from the trigger on. ("Eventually not" would require almost nothing: the agent
+    could do what is forbidden, and something else before or afterwards.)"""
     return Property("", Always(Implies(trigger, Always(kept))), trigger, forbidden=psl.negation(kept))
 
 
 def _until(trigger: Formula, kept: Formula, ended: Formula) -> Property:
-    """What is kept from the trigger on, until something comes, which need not come."""
+    """A condition that holds from the trigger on, until another holds, which need not happen."""
     said = Always(Implies(trigger, Release(ended, psl.disjunction([kept, ended]))))
     why = "it fails in some state of the agent, and a step of the contract may have several: that refutes nothing"
     return Property("", said, trigger, indecisive=why)
 
 
 def _stand_in(units: Sequence[Unit], least: Formula, extras: Sequence[Extra]) -> Left | None:
-    """The property of the plan that says when all that the clause forbids must not be."""
+    """The property of the plan that says when all that the clause forbids must not hold."""
     banned = [u.term for u in units if u.forbids]
     for extra in extras:
         assert extra.forbids is not None
@@ -117,8 +117,8 @@ _Clause = tuple[Unit, ...]
 
 
 def _parted(goal: Mapped) -> tuple[list[tuple[_Clause, Formula]], list[tuple[_Clause, _Clause]]]:
-    """What the consequent demands, grouped by the input parts that it offers as a way out; and what it forbids: clauses
-    with such ways out, and what must be kept."""
+    """The demands of the consequent, grouped by the input parts that it offers as alternatives; and its prohibitions:
+    clauses with such alternatives, and the parts that must be kept."""
     if all(unit.output and not unit.forbids for unit in _units(goal)):
         formula = to_formula(goal)
         return ([] if formula == psl.TRUE else [((), formula)]), []
@@ -144,7 +144,7 @@ def _units(mapped: Mapped) -> Iterator[Unit]:
 
 
 def _alternatives(trigger: Formula) -> Sequence[Formula]:
-    """The disjuncts of a trigger, unless they are many."""
+    """The disjuncts of a trigger, unless there are too many."""
     if isinstance(trigger, psl.Or):
         return trigger.items if len(trigger.items) <= ALTERNATIVES else [trigger]
     if not isinstance(trigger, psl.And):

@@ -1,7 +1,7 @@
-"""Runs done again by the real AIL: our lasso as a scripted environment, with the same draws.
+"""Runs repeated by the real AIL: our lasso as a scripted environment, with the same draws.
 
-AIL runs the program as it is, without AJPF, in seconds. It tells each action and draw, with what the agent believes
-then; our run says what should be told. Where they part, one of the two interpreters is wrong.
+AIL runs the program as it is, without AJPF, in seconds. It reports each action and draw, with the agent's beliefs at
+that time; our run gives the expected report. If they differ, one of the two interpreters is wrong.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ Run = tuple[Graph, Lasso]
 
 @dataclass(frozen=True, slots=True)
 class Moment:
-    """An action, or a draw where there is none (`why` is then start or idle), and what is believed at that time."""
+    """An action, or a draw without one (`why` is then start or idle), and the beliefs at that time."""
 
     why: str
     beliefs: tuple[str, ...]
@@ -46,7 +46,8 @@ class Moment:
 
 
 def expected(graph: Graph, lasso: Lasso) -> tuple[tuple[Moment, ...], Script]:
-    """What the run tells, its loop gone through twice, and what the environment and the scheduler choose on it."""
+    """The expected report of the run, its loop unrolled twice, and the choices of the environment and the scheduler on
+    it."""
     system = graph.system
     path = [*lasso.path, *lasso.path[lasso.loop :], lasso.path[lasso.loop]]
     moments, draws, turns = [], [], []
@@ -99,8 +100,8 @@ def _told(system: System, state: Any, why: str) -> Moment:
 def replay(
     installation: Installation, setup: Setup, runs: Sequence[Run], folder: Path, outside: Outside
 ) -> tuple[Answer, ...]:
-    """For each run whether AIL does it (holds) or another one (violated, with the difference); an error where it cannot
-    be run. One Java does all that are not kept from earlier (`asking`); `outside` records what it reads."""
+    """For each run whether AIL does it (holds) or another one (violated, with the difference); an error if it cannot be
+    run. One Java process does all that are not cached (`asking`); `outside` records what it reads."""
     files = system_files(setup, "agent", scripted=True)
     asked = [expected(graph, lasso) for graph, lasso in runs]
     keys = [key({**files, SCRIPT: script.text()}, "replay", installation.mark()) for _, script in asked]
@@ -119,12 +120,12 @@ def _judged(told: Answer | None, asked: tuple[Sequence[Moment], Script], key: st
         return told
     if (difference := _difference(asked[0], told.log)) is not None:
         return replace(told, said=Said.VIOLATED, reason=difference)
-    keep(key, told)  # anything else may come of the machine, and is tried again
+    keep(key, told)  # any other result may be due to the machine, and is retried
     return told
 
 
 def sampled(graph: Graph, runs: int) -> Iterator[Lasso]:
-    """Runs drawn by chance (the same each time), each till a state comes again."""
+    """Random runs (the same each time), each until a state repeats."""
     chance = random.Random(0)
     for _ in range(runs):
         path, places = [chance.choice(graph.initial)], dict[int, int]()

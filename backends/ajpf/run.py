@@ -60,7 +60,7 @@ def settle(job: Job, folder: Path, limits: Limits, version: str) -> Report:
 
 
 class _Run:
-    """What becomes known, step by step."""
+    """The results so far."""
 
     def __init__(self, setup: Setup, made: Instantiation, folder: Path, limits: Limits) -> None:
         self.setup = setup
@@ -73,9 +73,9 @@ class _Run:
         self.counterexamples: dict[str, Counterexample] = {}
         self.bound: dict[str, Any] = {}
         self.checkers: dict[str, Checker] = {}
-        """Property's key → what knows the state space that it was checked on."""
+        """Property's key → the checker with the state space that it was checked on."""
         self.reductions: dict[str, Reduction] = {}
-        """Property's key → by what the state space of its checker was made smaller, if it was."""
+        """Property's key → the reduction of its checker's state space, if any."""
         self.engine = ENGINE
         self.logs: dict[str, str] = {}
         self.command: tuple[str, ...] = ()
@@ -99,8 +99,8 @@ class _Run:
     # Our own engine
 
     def own(self) -> None:
-        """Results for every property; where a bound was met, a violation within it still counts. Properties that ask
-        for percepts have a state space of their own (`interpreter.Agent`)."""
+        """Results for every property; if a bound was met, a violation within it still counts. Properties about percepts
+        have a state space of their own (`interpreter.Agent`)."""
         self.bound |= {"states": 0, "transitions": 0, "exhaustive": True}
         for probed in (False, True):
             properties = [p for p in self.made.properties if asks_for_percepts(p) is probed]
@@ -173,8 +173,8 @@ class _Run:
         return Settled(verdict, reason, answer, result.vacuous, result.immediate, result.valid, refutes)
 
     def judged(self, p: Property, verdict: Verdict, refutes: bool) -> tuple[Verdict, str]:
-        """What an answer for a property says of its guarantee. What is forbidden after the trigger may come much later,
-        for another reason: a refutation it is only where it is the answer to the trigger (`Result.answered`)."""
+        """The meaning of a property's answer for its guarantee. A forbidden formula may hold long after the trigger,
+        for another reason: that is a refutation only if it is the answer to the trigger (`Result.answered`)."""
         if verdict is Verdict.REFUTED and p.indecisive:
             return Verdict.UNKNOWN, p.indecisive
         if verdict is not Verdict.REFUTED or refutes or p.forbidden is None:
@@ -187,8 +187,8 @@ class _Run:
         return Verdict.UNKNOWN, reason
 
     def explain(self) -> None:
-        """A run for the first refuted property of each guarantee, and of each further property. Where AJPF is
-        installed, AIL does these runs again, and some of each state space by which properties hold."""
+        """A run for the first refuted property of each guarantee, and of each further property. If AJPF is installed,
+        AIL repeats these runs, and some of each state space by which properties hold."""
         groups = [claim.properties for claim in self.made.claims] + [ps for _, ps in self.made.extras]
         runs: list[tuple[str, Run]] = []
         for group in groups:
@@ -202,7 +202,7 @@ class _Run:
     def explained(self, refuted: Property) -> Run | None:
         checker = self.checkers[refuted.key]
         lasso = checker.lasso(refuted)
-        if lasso is None:  # the reduced and the whole graph disagree: never to happen, never to be passed over
+        if lasso is None:  # the reduced and the whole graph disagree: never expected, never ignored
             self.results[refuted.key] = Settled(Verdict.ERROR, "the checker contradicts itself")
             return None
         graph, lasso = self.whole(refuted.key, checker.graph, lasso)
@@ -212,7 +212,7 @@ class _Run:
         return graph, lasso
 
     def whole(self, key: str, graph: Graph, lasso: Lasso) -> Run:
-        """The run with all that a reduction leaves out."""
+        """The run with the parts that a reduction leaves out."""
         return unfolded(self.reductions[key], graph, lasso) if key in self.reductions else (graph, lasso)
 
     def samples(self) -> Iterator[Run]:
@@ -222,8 +222,8 @@ class _Run:
                 yield self.whole(key, graph, lasso)
 
     def replay(self, ajpf: Installation, runs: Sequence[tuple[str, Run]]) -> None:
-        """AIL does the runs again: if one goes another way, our interpreter is not AIL's for this program, and there is
-        no verdict on anything."""
+        """AIL repeats the runs: if one differs, our interpreter disagrees with AIL's for this program, and there is no
+        verdict on anything."""
         name = f"AIL ({ajpf.version})"
         if not runs:
             return
@@ -255,8 +255,8 @@ class _Run:
     # Others
 
     def unanswered(self, observed: Iterable[Observed]) -> None:
-        """What was looked at for a second opinion that did not come: it may come once that is another. What cannot be
-        recorded is left out, as no answer of ours rests on it."""
+        """Record what was read for a second opinion that failed: it may succeed once that changes. What cannot be
+        recorded is left out, as none of our answers depends on it."""
         self.observed.update(dict.fromkeys(o for o in observed if o.kind is not Seen.OUTSIDE))
 
     def ask_ajpf(self) -> None:

@@ -21,25 +21,25 @@ from .words import together
 
 @dataclass(frozen=True, slots=True)
 class Settled:
-    """What is known of one property. `verdict` is checked, refuted, unknown, error or not-run."""
+    """The result for one property. `verdict` is checked, refuted, unknown, error or not-run."""
 
     verdict: Verdict
     reason: str = ""
     answer: Verdict | None = None
-    """Whether the property as written holds (checked) or fails (refuted) of the agent, where that is known."""
+    """Whether the property as written holds (checked) or fails (refuted) for the agent, if known."""
     vacuous: bool = False
     immediate: bool = False
     valid: bool = False
-    """True of every agent, through the table alone."""
+    """True for every agent, through the table alone."""
     refutes: bool = True
-    """Whether a run on which the property fails refutes the guarantee: where it does not, that makes an unknown."""
+    """Whether a run on which the property fails refutes the guarantee; otherwise the verdict is unknown."""
     opinions: Mapping[str, str] = field(default_factory=dict)
     """Other engines' answers: ``{"AIL (…)": "does the same run"}``."""
 
 
 @dataclass(frozen=True, slots=True)
 class Frame:
-    """What all outcomes of a method have in common."""
+    """The parts that all outcomes of a method share."""
 
     setup: Setup
     made: Instantiation
@@ -109,8 +109,9 @@ def _no_messages(programs: Sequence[Program]) -> Iterator[str]:
 
 
 def _left_to_a_person(claim: Claim, attached: Sequence[tuple[Extra, Sequence[Property]]]) -> Iterator[str]:
-    """A property of the plan stands for what the guarantee forbids, whatever the property's trigger is: that it is
-    the guarantee's is said to be assumed. What can be decided of it without the agent is."""
+    """A property of the plan stands for what the guarantee forbids, whatever the property's trigger is: that the
+    trigger is the guarantee's is reported as an assumption. The part that can be decided without the agent is decided.
+    """
     for name in dict.fromkeys(left.extra for left in claim.left):
         bans = list(dict.fromkeys(left.ban for left in claim.left if left.extra == name))
         said = psl.conjunction([p.formula for e, ps in attached for p in ps if e.name == name])

@@ -1,8 +1,9 @@
-"""A normal form of formulas for matching against a plan's table: what differs in writing only must look the same.
+"""A normal form of formulas for matching against a plan's table: formulas that differ only in notation must look the
+same.
 
 Negation normal form over ``== < <= in`` and applications; ``f(x) == TRUE`` is ``f(x)``; ``t != s`` and ``!in`` are
-negations; quantifiers stand as far inside as they can: ``exists(x | P or Q)`` is two, and what does not mention x
-stands outside. (All sorts are non-empty, so that is sound.) Meaning is kept exactly.
+negations; quantifiers are as far inside as possible: ``exists(x | P or Q)`` is two, and parts that do not mention x are
+outside. (All sorts are non-empty, so that is sound.) The meaning is preserved.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from .tuning import FORMULA_DEPTH, MULTIPLIED_OUT, PARTS
 
 
 class TooComplex(Exception):  # noqa: N818 - it names what happened
-    """The formula is nested too deeply, or multiplies out to too much."""
+    """The formula is nested too deeply, or multiplies out to too many parts."""
 
 
 def shape(term: t.Term) -> t.Term:
@@ -41,7 +42,7 @@ def _written_out(term: t.Term) -> int:
             return 1 + 2 * sum(sizes)
         case t.Compare(left=left) if left.sort == BOOL:
             return 1 + 2 * sum(sizes)
-        case _:  # its parts stand in it once
+        case _:  # its parts occur in it once
             return 1 + sum(sizes)
 
 
@@ -66,7 +67,7 @@ def _shaped(term: t.Term) -> t.Term:
 
 
 def _formula(term: t.Term) -> t.Term:
-    """Of a formula whose negations stand at its atoms."""
+    """The normal form of a formula whose negations are at its atoms."""
     match term:
         case t.And(items=items):
             return conjunction([_formula(i) for i in items])
@@ -136,7 +137,7 @@ def _integer(value: int) -> t.Literal:
 
 
 def _quantified(exists: bool, variables: tuple[t.Variable, ...], body: t.Term) -> t.Term:
-    """``exists`` distributes over ``or`` and stands outside only of what it binds (``forall`` the other way round)."""
+    """``exists`` distributes over ``or`` and encloses only what it binds (``forall`` the other way round)."""
     outer = disjuncts if exists else conjuncts
     join_outer = disjunction if exists else conjunction
     blocks = []
@@ -146,7 +147,7 @@ def _quantified(exists: bool, variables: tuple[t.Variable, ...], body: t.Term) -
 
 
 def _multiplied(exists: bool, variables: tuple[t.Variable, ...], body: t.Term) -> t.Term:
-    """Disjunctive form (for ``exists``) of what mentions the variables."""
+    """Disjunctive form (for ``exists``) of the parts that mention the variables."""
     names = {v.name for v in variables}
     inner = conjuncts if exists else disjuncts
     outer = disjuncts if exists else conjuncts
@@ -167,7 +168,7 @@ def _multiplied(exists: bool, variables: tuple[t.Variable, ...], body: t.Term) -
 
 
 def _scoped(exists: bool, variables: tuple[t.Variable, ...], block: t.Term) -> t.Term:
-    """Conjuncts (for ``exists``) that share no variable are parted."""
+    """Conjuncts (for ``exists``) that share no variable are separated."""
     inner = conjuncts if exists else disjuncts
     join = conjunction if exists else disjunction
     names = {v.name for v in variables}

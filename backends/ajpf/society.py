@@ -1,8 +1,9 @@
-"""Several agents in one environment, as AJPF schedules them: what one does, all may perceive, and they send messages.
+"""Several agents in one environment, as AJPF schedules them: all may perceive the effects of one's actions, and they
+send messages.
 
-The scheduler is AIL's `ActionScheduler`: an agent goes on till something has changed for anybody (an action or a draw
-that brought percepts, a message, an agent that fell asleep or woke); then any agent that is awake may be next, in
-every way. Percepts wake all agents, a message the one that it is for. One agent's jobs are the interpreter's own.
+The scheduler is AIL's `ActionScheduler`: an agent runs until something has changed for any agent (an action or a draw
+that brought percepts, a message, an agent that fell asleep or woke); then any agent that is awake may be next, in every
+order. Percepts wake all agents, a message its receiver. One agent's jobs are the interpreter's own.
 """
 
 from __future__ import annotations
@@ -22,19 +23,19 @@ T = TypeVar("T")
 
 
 class Common(NamedTuple):
-    """What there is after a job. Minds (`interpreter.State`), actions and draws by their numbers, agents by their
-    places."""
+    """The situation after a job. Minds (`interpreter.State`), actions and draws by their numbers, agents by their
+    indices."""
 
     minds: tuple[int, ...]
     mail: tuple[tuple[int, ...], ...]
-    """For each agent the messages that it has yet to read, as intentions, in the order in which it will."""
+    """For each agent its unread messages, as intentions, in the order in which it will read them."""
     awake: tuple[bool, ...]
     turn: int
-    """Whose job was the last."""
+    """The agent whose job was the last."""
     changed: bool
     """Another agent may be next."""
     last: int
-    """The last action and whose it was, or NONE."""
+    """The last action and its agent, or NONE."""
     choice: int
     begun: bool
     waited: bool
@@ -65,11 +66,11 @@ class Society:
         return state.minds
 
     def did(self, state: Common) -> tuple[int, Struct] | None:
-        """Which of `agents` acted last, and its action."""
+        """The index in `agents` of the agent that acted last, and its action."""
         return None if state.last == NONE else self._actions.all[state.last]
 
     def sees(self, state: Common) -> tuple[Struct, ...]:
-        """The percepts on offer that AJPF's P speaks of: until every agent has perceived them."""
+        """The percepts on offer to which AJPF's P refers: until every agent has perceived them."""
         if (
             not state.begun
             or state.over
@@ -84,8 +85,8 @@ class Society:
         return looks if len(looks) == 1 else (first,)
 
     def _looks(self, state: Common) -> tuple[Common, ...]:
-        """Where properties ask for percepts, AJPF looks at the environment before the first turn: that is the first
-        draw. If there is no choice in it, the first state is the one after it."""
+        """If properties are about percepts, AJPF reads the environment before the first turn: that is the first draw.
+        If there is no choice in it, the first state is the one after it."""
         if state.begun or not self.probed:
             return ()
         return tuple(state._replace(choice=draw, begun=True, drawn=True) for draw in self.world.first())
@@ -106,7 +107,7 @@ class Society:
         )
 
     def successors(self, state: Common) -> tuple[Common, ...]:
-        """Never empty: a run that has ended stays where it is, and nothing is drawn any more."""
+        """Never empty: a run that has ended stays in its state, without further draws."""
         if state.over:
             return (state._replace(drawn=False),)
         if looks := self._looks(state):
@@ -116,15 +117,15 @@ class Society:
         return tuple(dict.fromkeys(after for turn in self.turns(state) for after in self.moves(state, turn)))
 
     def turns(self, state: Common) -> tuple[int, ...]:
-        """Whose job may be the next: any agent's that is awake, once something has changed for anybody."""
+        """The agents whose job may be next: all that are awake, once something has changed for any agent."""
         return tuple(place for place, up in enumerate(state.awake) if up) if state.changed else (state.turn,)
 
     def moves(self, state: Common, turn: int) -> Iterator[Common]:
-        """What the next job of this agent makes of the state."""
+        """The states after the next job of this agent."""
         return self._job(state._replace(changed=False, drawn=False, turn=turn))
 
     def place(self, to: Term) -> int | None:
-        """Which of `agents` a message is for, if any."""
+        """The index in `agents` of a message's receiver, if any."""
         return self._places.get(plain(name_of(to)))
 
     # Jobs of the agent whose turn it is
@@ -152,7 +153,7 @@ class Society:
     def _after_cycle(
         self, place: int, number: int, choice: int, letters: tuple[int, ...], again: bool
     ) -> tuple[int, bool]:
-        """The agent's own state then, and whether it sleeps. `choice` is what it perceives, if that is new."""
+        """The agent's own state then, and whether it sleeps. `choice` is the draw that it perceives, if that is new."""
         agent = self.agents[place]
         after = agent.cycle(agent.altered(number, choice=choice), again=again, letters=letters)
         return agent.own(after), agent.core(after).asleep
@@ -186,7 +187,7 @@ class Society:
             yield self._delivered(drawn, place, deed.term) if deed.kind is DeedKind.SEND else drawn
 
     def _idle(self, state: Common) -> Iterator[Common]:
-        """All agents sleep: the environment moves on, or the run is over."""
+        """All agents sleep: the environment draws, or the run is over."""
         when = self.environment.at_quiescence
         if when == "never" or state.waited:
             yield state._replace(over=True)
@@ -210,7 +211,7 @@ class Society:
         return state
 
     def _offered(self, state: Common, draw: int) -> Common:
-        """A draw was made. All agents look again, if there was or is anything to see; what there is wakes them."""
+        """A draw was made. All agents perceive again, if there were or are any percepts; percepts wake them."""
         now = self.world.offers(draw)
         if now or self.world.offers(state.choice):
             seen = (agent.altered(mind, new=True) for agent, mind in zip(self.agents, state.minds, strict=True))
@@ -219,7 +220,7 @@ class Society:
         return state._replace(awake=(True,) * len(self.agents), changed=True) if now else state
 
     def _delivered(self, state: Common, sender: int, message: object) -> Common:
-        """The message is with its receiver, if there is such an agent. The same message is there only once."""
+        """The message is delivered to its receiver, if there is such an agent. Equal messages are kept only once."""
         assert isinstance(message, Struct)
         to, force, content = message.args
         state = state._replace(changed=True)
@@ -237,7 +238,7 @@ class Society:
 def system(
     programs: Sequence[Program], environment: Environment, semantics: Semantics, *, probed: bool = False
 ) -> Agent | Society:
-    """The agents of one system. What an agent alone sends goes nowhere, not even to itself."""
+    """The agents of one system. The messages of a single agent go nowhere, not even to itself."""
     if len(programs) == 1:
         return Agent(programs[0], environment, semantics, probed=probed)
     return Society(programs, environment, semantics, probed=probed)
@@ -247,7 +248,7 @@ _FORCES = {"tell": "1", "perform": "2", "achieve": "3"}
 
 
 def _text(message: object) -> str:
-    """A message as AIL writes it: by these texts it sorts."""
+    """A message as AIL writes it: AIL sorts by these texts."""
     assert isinstance(message, Struct)
     sender, to, force, content = message.args
     return f"{plain(sender)},{plain(to)},{_FORCES[plain(force)]},{plain(content)})"

@@ -32,7 +32,7 @@ class Goal:
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """What triggers a plan: ``+danger``, ``-danger``, ``+!serve(1)``, ``-!serve(1)``."""
+    """The trigger of a plan: ``+danger``, ``-danger``, ``+!serve(1)``, ``-!serve(1)``."""
 
     sign: Sign
     term: Term
@@ -49,13 +49,13 @@ class Condition:
     positive: bool = True
     is_goal: bool = False
     goal: GoalKind | None = None
-    """Of a goal: its kind; without a written kind it is either."""
+    """The kind of a goal; without a written kind it is either."""
     test: str | None = None
     """``<`` or ``==``: the term compares its two arguments as numbers."""
     group: tuple[Condition, ...] = ()
-    """What a negated group denies: ``~(square(X, Y), ~empty(X, Y))``; it has no term."""
+    """The body of a negated group: ``~(square(X, Y), ~empty(X, Y))``; it has no term."""
     is_cut: bool = False
-    """``!`` in a reasoning rule: what was found so far stands, and no other rule is tried."""
+    """``!`` in a reasoning rule: the bindings found so far are kept, and no other rule is tried."""
 
     def terms(self) -> Iterator[Term]:
         if self.term is not None:
@@ -76,7 +76,7 @@ class DeedKind(StrEnum):
     SEND = ".send"
     ACTION = "action"
     NULL = "null"
-    """Nothing: what is left of a deed that posted a goal to be performed."""
+    """No effect: the remainder of a deed that posted a goal to be performed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,8 +126,8 @@ class Program:
 
 
 RECEIVED, SENT = ".received", ".sent"
-"""Names of the event of a message received, ``.received(From, To, tell, content)``, and of what an agent remembers of
-those that it sent, ``.sent(to, from, tell, content)``."""
+"""Names of the event of a received message, ``.received(From, To, tell, content)``, and of an agent's memory of a sent
+one, ``.sent(to, from, tell, content)``."""
 
 
 def show_event(event: Event) -> str:

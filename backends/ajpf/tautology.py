@@ -1,11 +1,11 @@
-"""Formulas that hold of every agent: what a table can turn a claim into, and what then shows nothing.
+"""Formulas that hold for every agent: a table can turn a claim into one, which then shows nothing.
 
-Decided without the agent: on all words over the formula's atoms, except those that no agent can give: where a special
-case is (``D(a, go(1))``), so is what covers it (``D(a, go(_))``); only one action is the last one; what is intended is
-wanted. (Not for beliefs: a reasoning rule with a negation may derive ``f(1)`` and not ``f(_)``.)
+Decided without the agent: on all words over the formula's atoms, except those that no agent can produce: if a special
+case holds (``D(a, go(1))``), so does its generalisation (``D(a, go(_))``); only one action is the last one; an intended
+goal is wanted. (Not for beliefs: a reasoning rule with a negation may derive ``f(1)`` and not ``f(_)``.)
 
-What stands of one agent whatever its plans do (what its rules derive, first beliefs that nothing drops) are further
-laws: a property that follows from these alone shows nothing of what the agent decides.
+Facts about one agent whatever its plans do (beliefs that its rules derive, initial beliefs that nothing drops) are
+further laws: a property that follows from these alone shows nothing about the agent's decisions.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ _EXISTENTIAL = (Modality.DID, Modality.WANTS, Modality.INTENDS, Modality.INTENDS
 
 
 Laws = Callable[[tuple[Atom, ...]], Iterable[Formula]]
-"""What is known of the states of one agent, as far as it bears on some atoms (`standing`)."""
+"""The facts known about the states of one agent, as far as they concern some atoms (`standing`)."""
 
 
 def _no_laws(atoms: tuple[Atom, ...]) -> Iterable[Formula]:
@@ -40,7 +40,7 @@ class Steps:
 
 
 def is_valid(formula: Formula, laws: Laws = _no_laws) -> bool:
-    """Whether a property holds on every run of every agent of which the laws are true. Raises ltl.TooLarge."""
+    """Whether a property holds on every run of every agent that satisfies the laws. Raises ltl.TooLarge."""
     automaton = psl.automaton_of(psl.Not(formula))
     known: dict[int, bool] = {}
     steps = Steps()
@@ -74,7 +74,7 @@ def constant(formula: Formula) -> bool | None:
 
 
 def is_satisfiable(formula: Formula, steps: Steps | None = None, laws: Laws = _no_laws) -> bool:
-    """Of a formula without temporal operators; true also where finding out would take too long."""
+    """For a formula without temporal operators; also true if deciding it would take too long."""
     atoms = tuple(dict.fromkeys(psl.atoms(formula)))
     whole = psl.And((formula, *_laws(atoms), *laws(atoms)))
     steps = steps or Steps()
@@ -95,7 +95,7 @@ def is_satisfiable(formula: Formula, steps: Steps | None = None, laws: Laws = _n
 
 
 def _value(formula: Formula, assigned: dict[Atom, bool], open_atoms: list[Atom]) -> bool | None:
-    """The truth value as far as the assignment decides it; atoms that it would need next are added to `open_atoms`."""
+    """The truth value if the assignment decides it; atoms that are needed next are added to `open_atoms`."""
     match formula:
         case psl.Truth(value=value):
             return value
@@ -166,16 +166,16 @@ def _meet(one: Term, other: Term, at_variables: Callable[[Term, Term], bool | No
     return True
 
 
-# What stands of one agent whatever its plans do
+# Facts about one agent whatever its plans do
 
 
 def standing(programs: Sequence[Program], percepts: Sequence[Struct]) -> Laws:
-    """Laws for the beliefs that some atoms ask for. `percepts` are all that there may be."""
+    """Laws for the beliefs in some atoms. `percepts` are all possible ones."""
     by_name = {program.name: program for program in programs}
 
     def laws(atoms: tuple[Atom, ...]) -> Iterator[Formula]:
         known = list(dict.fromkeys(atom for atom in atoms if atom.modality is Modality.BELIEVES))
-        for atom in known:  # it grows: what a body asks for may be derived too
+        for atom in known:  # it grows: the beliefs in a body may be derived too
             program = by_name.get(atom.agent)
             if program is None:
                 continue
@@ -191,7 +191,7 @@ def standing(programs: Sequence[Program], percepts: Sequence[Struct]) -> Laws:
 
 
 def _stays(program: Program, wanted: Struct, percepts: Sequence[Struct]) -> bool:
-    """Whether a first belief is such that no deed drops it and no percept takes it along when it goes."""
+    """Whether an initial belief is dropped by no deed and by no percept that disappears."""
     own = named_apart(wanted)
     dropped = [d.term for plan in program.plans for d in plan.deeds if d.kind is DeedKind.DROP_BELIEF]
     return any(
@@ -224,7 +224,7 @@ def _plain(condition: Condition) -> bool:
 
 
 def _instances(body: Sequence[Condition], bindings: Bindings, facts: Sequence[Struct]) -> Iterator[Bindings]:
-    """The body's variables as the facts that are spoken of bind them; those of one condition alone may stay free."""
+    """The body's variables as bound by the known facts; those of a single condition may stay free."""
     if not body:
         yield bindings
         return
@@ -241,7 +241,7 @@ def _instances(body: Sequence[Condition], bindings: Bindings, facts: Sequence[St
 
 
 def _shown(term: Term) -> Struct:
-    """As a property asks for it: ``_`` for what is free."""
+    """The term as in a property: ``_`` for free variables."""
     made = rename(term, {name: Var("_") for name in variables(term)})
     assert isinstance(made, Struct)
     return made

@@ -1,4 +1,4 @@
-"""Terms of agent programs, and what is done with them: printing, renaming, unification."""
+"""Terms of agent programs, and operations on them: printing, renaming, unification."""
 
 from __future__ import annotations
 
@@ -62,13 +62,13 @@ def plain(term: Term) -> str:
 
 
 def name_of(agent: Term) -> Term:
-    """The agent that a message is for: AIL takes a text for a name, too."""
+    """The receiver of a message: AIL accepts a text as a name, too."""
     text = isinstance(agent, Struct) and not agent.args and agent.functor[:1] in ("'", '"')
     return Struct(agent.functor[1:-1]) if isinstance(agent, Struct) and text else agent
 
 
 def subterms(term: Term) -> Iterator[Term]:
-    """The term and all that is in it, in reading order."""
+    """The term and all its subterms, in reading order."""
     yield term
     if isinstance(term, Struct):
         for arg in term.args:
@@ -108,7 +108,7 @@ def named_apart(term: Struct) -> Struct:
 
 
 def rename(term: Term, names: Mapping[str, Term]) -> Term:
-    """The term with other variables in the place of its own, once: what comes in is not looked at again."""
+    """The term with its variables replaced, once: the replacements are not replaced again."""
     if isinstance(term, Var):
         return names.get(term.name, term)
     return Struct(term.functor, tuple(rename(arg, names) for arg in term.args)) if term.args else term
@@ -158,7 +158,7 @@ def _resolve(term: Term, bindings: Mapping[str, Term]) -> Term:
 
 
 def apart(term: Term, suffix: str) -> Term:
-    """The term with variables of its own: what was added as a belief with variables speaks of anything, and a plan or a
-    rule is used more than once."""
+    """The term with fresh variables: a belief with variables applies to anything, and a plan or a rule is used more
+    than once."""
     names = set(variables(term))
     return rename(term, {name: Var(name + suffix) for name in names}) if names else term

@@ -1,6 +1,6 @@
-"""Clauses that speak of steps to come, as temporal properties: what can be said of them without counting.
+"""Clauses about future steps, as temporal properties: the part that needs no counting.
 
-`T -> eventually(R)` is ``[] (T -> <> R)``. `within` and `next` are that too, and that it comes in time is a hypothesis.
+`T -> eventually(R)` is ``[] (T -> <> R)``. `within` and `next` become the same, and the time limit is a hypothesis.
 `T -> R until U` is ``[] (T -> (U R (R || U)))``, of the agent's states: they are finer than the contract's steps, so
 that a run on which it fails refutes nothing.
 """
@@ -20,18 +20,18 @@ from avow.language.terms import TRUE, History, Implies, Past, Quantified, Quanti
 
 @dataclass(frozen=True, slots=True)
 class Timed:
-    """A guarantee about steps to come. `formula` is ``T -> R`` under the quantifiers around it."""
+    """A guarantee about future steps. `formula` is ``T -> R`` under the quantifiers around it."""
 
     operator: Past
     formula: Term
     ends: Term | None
     """U, of `until`."""
     hypothesis: str
-    """What is not shown of it."""
+    """The part of it that is not shown."""
 
 
 def timed(formula: Term) -> Timed | None:
-    """A clause that is a response; None of one of a single step."""
+    """A clause that is a response; None for one about a single step."""
     found = responding(formula)
     if found is None:
         return None
@@ -56,7 +56,7 @@ def _hypothesis(response: History) -> str:
 
 
 def unsaid(judge: str, node: Node, clause: Clause) -> str | None:
-    """Why the agent cannot be asked about a guarantee that speaks of other steps, or whose node assumes what does."""
+    """Why a guarantee about other steps, or whose node has an assumption about other steps, cannot be checked."""
     for each in node.assumptions:
         for record in histories(each.formula):
             about = f"of which {node.name}'s assumption {each.name} speaks"

@@ -1,34 +1,34 @@
-"""This backend's numbers: how much is read, how far is searched, how much is shown; each with its reason."""
+"""This backend's numbers: limits of reading, search and display; each with its reason."""
 
 RULE_DEPTH = 60
-"""Belief rules that call each other: one that calls itself never ends, and the search must."""
+"""The depth of belief rules that call each other: one that calls itself never ends, and the search must."""
 
 RULE_STEPS = 300_000
-"""Beliefs and rules tried to answer one question that an agent asks itself: about a second's work."""
+"""Beliefs and rules tried for one query: about a second's work."""
 
 DRAWS = 4096
 """Combinations of percepts that an environment may draw in one step: each is a branch of every state."""
 
 STATES = 2_000_000
-"""States explored where nothing else is said; the limit on memory is mostly met before."""
+"""States explored by default; the limit on memory is mostly met before."""
 
 INTENTIONS = 6
-"""So many intentions at once, and the agent has probably fallen behind its percepts for good."""
+"""With more intentions at once, the agent has probably fallen behind its percepts for good."""
 
 PROPERTIES = 5_000
 """Instances of one guarantee: each is a property that is checked by itself."""
 
 TAIL = 5_000
-"""Steps that a bad prefix is followed for, till a state comes again: a run has to be shown whole."""
+"""Steps for which a bad prefix is followed until a state repeats: a run has to be shown whole."""
 
 INDEX_VALUES = 1_000
 """Values of one index of a mapping's row, which are written out."""
 
 DEFAULT_STATES = 1_000_000
-"""States that a method explores unless its options say otherwise: whoever knows that an agent needs more says so."""
+"""States that a method explores unless its options say otherwise: an agent that needs more has the option."""
 
 PROGRAM_BYTES = 2_000_000
-"""A larger file is no agent that anybody wrote."""
+"""A larger file is not a hand-written agent."""
 
 PROPERTY_LENGTH = 20_000
 """Characters of a property written by hand."""
@@ -40,31 +40,31 @@ ALTERNATIVES = 8
 """Alternatives of a trigger that are each explained: a reader follows no more."""
 
 REPLAY_MILLISECONDS = 10_000
-"""For one run. An agent that stands still for ever is ended; what it told counts."""
+"""For one run. An agent that does not continue is ended; its report so far counts."""
 
 REPLAY_START = 30.0
 """Seconds for Java to start and to load AIL's classes, on a busy machine."""
 
 SAMPLED_RUNS = 5
-"""Runs of each state space that AIL does again, besides those that refute."""
+"""Runs of each state space that AIL repeats, besides those that refute."""
 
 SAMPLED_STEPS = 400
 """Steps of such a run; a longer one is left out."""
 
 GRACE = 0.5
-"""Of the time limit, what may be used beyond it to look for violations in what could be explored."""
+"""The part of the time limit that may be used beyond it to find violations in the explored states."""
 
 LAZY_STATES = 200_000
-"""States after which the properties are asked for one by one, each on the part of the state space that it needs."""
+"""States after which the properties are checked one by one, each on the part of the state space that it needs."""
 
 PART_STATES = 20_000
 """States of such a part."""
 
 LAZY_SHARE = 0.02
-"""Of the time that is left, what one property may use for that."""
+"""The part of the remaining time that one property may use for that."""
 
 FORMULA_DEPTH = 120
-"""Deeper guarantees are refused by name: what translates them recurses."""
+"""Deeper guarantees are refused by name: the translation recurses."""
 
 MULTIPLIED_OUT = 256
 """More disjuncts (or conjuncts) than this under one quantifier are not multiplied out."""
@@ -76,19 +76,19 @@ TERM_DEPTH = 40
 """Terms nested deeper are refused by the parsers, so that every walk over a term may recurse."""
 
 TAUTOLOGY_CASES = 4_000
-"""Cases that are looked at, in all, before a formula is taken for one that depends on the agent."""
+"""Cases examined, in all, before a formula is taken to depend on the agent."""
 
 INDICES_TRIED = 400
-"""Combinations of index values that a row is tried with in each step."""
+"""Combinations of index values with which a row is tried in each step."""
 
 TURN = 1_000
-"""Jobs of one agent after which its turn is taken for endless: the orders of turns are then not reduced."""
+"""Jobs of one agent after which its turn is taken to be endless: the orders of turns are then not reduced."""
 
 LIVE_JOBS = 1_000
-"""Steps of a running program without an action: after so many it is taken for endless; a plan has some tens."""
+"""Steps of a running program without an action: after so many it is taken to be endless; a plan has some tens."""
 
 STANDING_ATOMS = 40
 """Beliefs to which rules are followed from those of a property, to see whether it follows from the rules alone."""
 
 STANDING_INSTANCES = 64
-"""Instances of one rule that are looked at for that."""
+"""Instances of one rule that are examined for that."""

@@ -1,8 +1,8 @@
 """A run of the agent in the contract's own words, through the plan's table read backwards.
 
-Each row of the table says which agent formula stands for which contract formula. So a step of a run can be told by the
-rows that hold in it: a column for each row, with the indices for which it holds. What the agent believes stays beside
-it, under names in parentheses: reports print those small.
+Each row of the table says which agent formula stands for which contract formula. So a step of a run is described by the
+rows that hold in it: a column for each row, with the indices for which it holds. The agent's beliefs are beside it,
+under names in parentheses: reports print those small.
 """
 
 from __future__ import annotations
@@ -29,15 +29,15 @@ Step = tuple[tuple[str, str], ...]
 
 @dataclass(frozen=True, slots=True)
 class Wording:
-    """`rows` is the plan's table; `told` what each formula that came of it stands for, as it was met in the contract;
-    `indices` the values that the plan gives to index variables."""
+    """`rows` is the plan's table; `told` the meaning of each formula from it, as found in the contract; `indices` the
+    values that the plan gives to index variables."""
 
     rows: Sequence[Row]
     told: Mapping[Formula, str]
     indices: Mapping[str, Sequence[int]] = field(default_factory=dict)
 
     def say(self, formula: Formula) -> str:
-        """A formula without temporal operators in the contract's words; what no row covers stays in the agent's."""
+        """A formula without temporal operators in the contract's words; uncovered parts stay in the agent's."""
         known = self.told.get(formula)
         if known is not None:
             return known
@@ -56,7 +56,7 @@ class Wording:
                 assert_never(formula)
 
     def _junction(self, items: Sequence[Formula], kind: type[psl.And] | type[psl.Or]) -> Iterator[str]:
-        """Several items may be what one row stands for: the rows that cover most come first."""
+        """One row may stand for several items: the rows that cover most come first."""
         rest = list(items)
         whole = [f for f in self.told if isinstance(f, kind) and set(f.items) <= set(rest)]
         for formula in sorted(whole, key=lambda f: -len(f.items)):
@@ -75,7 +75,7 @@ class Wording:
 
 
 def explain(graph: Graph, lasso: Lasso, refuted: Property, wording: Wording) -> Counterexample:
-    """The run on which a property fails: step by step what the contract speaks of, then what the agent believes."""
+    """The run on which a property fails: step by step the contract's columns, then the agent's beliefs."""
     visited = [graph.states[number] for number in lasso.path]
     rows = _contract_cells(graph, visited, wording)
     trace: list[Step] = []
@@ -116,7 +116,7 @@ def _because(graph: Graph, visited: Sequence[Any], places: Sequence[int], refute
 
 
 def _where(graph: Graph, visited: Sequence[Any], formula: Formula) -> list[int]:
-    """The places of the states in which a formula without temporal operators holds."""
+    """The indices of the states in which a formula without temporal operators holds."""
     atoms = tuple(dict.fromkeys(psl.atoms(formula)))
     test = compiled(formula, {atom: at for at, atom in enumerate(atoms)})
     return [at for at, label in enumerate(label_states(graph.system, visited, atoms)) if test(label)]
@@ -127,8 +127,8 @@ def _step(places: Sequence[int], at: int | None) -> str:
 
 
 def _contract_cells(graph: Graph, visited: Sequence[Any], wording: Wording) -> list[Step]:
-    """For each state and each row that ever holds: ``i = 1, 2``, or ``yes`` where the row has no index.
-    Of two rows that say the opposite of each other all along, the first is enough."""
+    """For each state and each row that ever holds: ``i = 1, 2``, or ``yes`` if the row has no index. If two rows are
+    opposites throughout, only the first is shown."""
     numbers = _numbers(graph, visited)
     tried: list[tuple[Row, dict[str, int], Formula]] = []
     for row in wording.rows:
@@ -172,7 +172,7 @@ def runs(numbers: Iterable[int]) -> str:
 
 
 def together(texts: Iterable[str], most: int | None = None) -> str:
-    """Instances in one text: ``i = 1, 2, 5…9``; of those that are no values of one variable so many, if not all."""
+    """Instances in one text: ``i = 1, 2, 5…9``; of those that are not values of one variable at most `most`."""
     shown = list(dict.fromkeys(texts))
     split = [text.split(" = ") for text in shown]
     if len(shown) > 1 and all(len(s) == 2 and s[0] == split[0][0] for s in split):
@@ -184,7 +184,7 @@ def together(texts: Iterable[str], most: int | None = None) -> str:
 def _instances(
     row: Row, ranges: Mapping[str, Sequence[int]], numbers: Sequence[int]
 ) -> Iterator[tuple[dict[str, int], Formula]]:
-    """The row's formula with numbers for its indices, and these; nothing for what no state decides."""
+    """The row's formula with numbers for its indices, and these; empty if no state decides it."""
     names = sorted(index_names(row.formula) & row.variables)
     domains = [sorted({*ranges.get(name, ()), *numbers}) for name in names]
     total = 1
@@ -201,7 +201,7 @@ def _instances(
 
 
 def _numbers(graph: Graph, visited: Sequence[Any]) -> list[int]:
-    """The whole numbers of which the agent speaks on its way."""
+    """The whole numbers that occur in the agent's run."""
     system = graph.system
     facts: set[Term] = set()
     for state in visited:
@@ -215,7 +215,7 @@ def _numbers(graph: Graph, visited: Sequence[Any]) -> list[int]:
 
 
 def _agent_cells(system: System, state: Any) -> Step:
-    """What was done last, what each agent believes beyond its first beliefs, what is new to perceive."""
+    """The last action, each agent's beliefs beyond its initial ones, the new percepts."""
     names = [f"{agent.program.name} " if len(system.agents) > 1 else "" for agent in system.agents]
     did = system.did(state)
     words = [("(last action)", "none" if did is None else f"{names[did[0]]}{show(did[1])}")]
