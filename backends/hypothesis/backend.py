@@ -68,7 +68,7 @@ def settle(job: Job, folder: Path, limits: Limits) -> Report:
     if callbacks.wanted(job):
         return callbacks.settle(job, limits, version)
     with tempfile.TemporaryDirectory(prefix="avow-") as scratch:
-        # what was exported is written afresh: a file changed in between would be tested in place of the contract
+        # the export is written afresh: a file changed in between would be tested instead of the contract
         place = Path(scratch)
         for name, text in files(job).items():
             (place / name).write_text(text, encoding="utf-8")
@@ -123,7 +123,7 @@ def _question(job: Job) -> Question:
 
 
 def _run(job: Job, place: Path, limits: Limits) -> tuple[Completed | None, Answer | None]:
-    """What Avow's run of the generated test came to, if it ended well."""
+    """The result of Avow's run of the generated test, if it completed."""
     (place / QUESTION).write_bytes(pickle.dumps(_question(job)))
     (place / "run.py").write_text("from avow.backends.hypothesis.running import main\n\nmain()\n", encoding="utf-8")
     seconds = max(1.0, limits.seconds * 0.8)
@@ -166,14 +166,14 @@ def _outcome(obligation: Obligation, answer: Answer, seed: int, wanted: int, ref
         shown = Counterexample(own.failure, why, own.trace)
         details[CASE] = own.case
         return replace(outcome, verdict=Verdict.REFUTED, summary=shown.text(), counterexample=shown)
-    if answer.silent:  # whatever else was found: it is of a unit that might have answered
+    if answer.silent:  # regardless of other findings: the unit might have answered
         why = f"{answer.silent}: that says nothing of what it would answer, and the next run asks again"
         return replace(outcome, verdict=Verdict.ERROR, summary=why, details={**details, RETRY: True})
     if answer.fault:
         return replace(outcome, verdict=Verdict.ERROR, summary=answer.fault)
     if answer.crash is not None:
         shown = Counterexample(*answer.crash)
-        # a class that raises has no output for inputs that the contract allows; a function may be no subject at all
+        # a class that raises has no output for inputs that the contract allows; a function may be unfit for testing
         verdict = Verdict.REFUTED if answer.crash_trace else Verdict.ERROR
         return replace(outcome, verdict=verdict, summary=shown.text(), counterexample=shown)
     apart = [Counterexample(case, why) for case, why in answer.apart]
@@ -196,8 +196,8 @@ def _outcome(obligation: Obligation, answer: Answer, seed: int, wanted: int, ref
 
 
 def _tested(outcome: Outcome, answer: Answer, own: Tried, wanted: int, seed: int) -> Outcome:
-    """That no case breaks it, and what so many cases justify."""
-    # steps of one run hang together where the contract remembers: then runs are what is counted
+    """The outcome if no case violates it, with the bound that so many cases justify."""
+    # steps of one run depend on each other if the contract remembers: then runs are counted
     counted = answer.valid if answer.runs is None else answer.runs
     hits = [t.cases if answer.runs is None else t.in_runs for t in own.triggers]
     least = min(hits, default=counted)
@@ -225,7 +225,7 @@ def _tested(outcome: Outcome, answer: Answer, own: Tried, wanted: int, seed: int
 
 
 def _counted(outcome: Outcome, clause: Clause, node: Node) -> Outcome:
-    """Elements of unspecified types are made up, by the cases and by the subject: it may have fewer, or others."""
+    """Elements of unspecified types are invented, by the cases and by the program: there may be fewer, or others."""
     sorts = {sort for c in (clause, *node.assumptions) for sort in opaque_sorts(c.formula)}
     if outcome.verdict is not Verdict.TESTED or not sorts:
         return outcome
@@ -252,7 +252,7 @@ def _doubt(answer: Answer, own: Tried, wanted: int) -> str:
 
 
 def _inexact(values: Sequence[tuple[str, str]]) -> str:
-    """A number of which Python's own float is another: what a subject compares with it, it may take for greater."""
+    """A note on a number that differs from its Python float: a program may compare the two wrongly."""
     for name, text in values:
         if name.startswith("in.") and re.fullmatch(r"-?[0-9]+\.[0-9]+", text) and Fraction(text) != float(text):
             return f"; {name} is exactly {text}, and the float {text} is another number: see `numbers:`"

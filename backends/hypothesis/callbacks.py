@@ -1,8 +1,8 @@
-"""A callback class that is tested: runs of messages in virtual time, judged as monitors judge a recording.
+"""Tests of a callback class: runs of messages in virtual time, judged as monitors judge a recording.
 
-Each run is of a new object, and has messages of which none breaks an assumption; what it publishes is judged against
-the latest messages that it had heard. What breaks a guarantee is cut down to as few messages as still break it, and has
-to break it in another process as well.
+Each run has a new object, and messages that violate no assumption; its publications are judged against the latest
+messages received. A violating run is reduced to as few messages as still violate the guarantee, and has to violate it
+in another process as well.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ def wanted(job: Job) -> bool:
 
 
 def problems(job: Job) -> tuple[Diagnostic, ...]:
-    """What is wrong with the options, as far as it is seen without running the class."""
+    """The problems of the options that can be found without running the class."""
     assert job.source is not None
     place = job.source.place.at("source")
     if numbers(job) == EXACT:
@@ -67,12 +67,12 @@ def problems(job: Job) -> tuple[Diagnostic, ...]:
 
 
 def files(job: Job) -> tuple[Path, ...]:
-    """The message types, besides the class and its parameters."""
+    """The files of the message types, besides the class and its parameters."""
     return tuple(message_files(job.system.plan.messages))
 
 
 def settle(job: Job, limits: Limits, version: str) -> Report:
-    """One outcome for each obligation. `problems` has found nothing, so that there is a judge."""
+    """One outcome for each obligation. `problems` is empty, so that there is a judge."""
     backend = judge_of_runs()
     assert backend is not None
     try:
@@ -96,7 +96,7 @@ def _work(job: Job, backend: Backend, limits: Limits) -> _Work:
 
 @dataclass(slots=True)
 class _Count:
-    """Of one guarantee."""
+    """The counts of one guarantee."""
 
     held: int = 0
     excused: int = 0
@@ -123,7 +123,7 @@ class _Work:
     replayed: int = 0
     counts: dict[str, _Count] = field(default_factory=dict)
     failing: dict[str, Messages] = field(default_factory=dict)
-    """Guarantee → a run that breaks it, or in which the class raises."""
+    """Guarantee → a run that violates it, or in which the class raises."""
     first: list[tuple[Messages, Run]] = field(default_factory=list)
     end: float = 0.0
 
@@ -140,7 +140,7 @@ class _Work:
     # -- runs --------------------------------------------------------------------------------------------
 
     def sweep(self) -> str:
-        """Drawn runs; why there are too few, if there are."""
+        """Run the drawn messages; the reason if there are too few."""
         number, many = 0, cases(self.job)
         while self.messages < many and len(self.failing) < len(self.counts):
             if time.monotonic() > self.end:
@@ -157,7 +157,7 @@ class _Work:
         return ""
 
     def allowed(self, seed: str) -> Messages:
-        """Generated messages, without those that break an assumption."""
+        """Generated messages, without those that violate an assumption."""
         events = list(self.driver.generated(self.length, seed))
         if not events:
             raise Rejected(Diagnostic("HYPO107", f"{self.driver.source.class_name} hears no topic of others"))
@@ -167,7 +167,7 @@ class _Work:
         return tuple(events)
 
     def ask(self, runs: Sequence[Messages]) -> tuple[Run, ...]:
-        """Each from its start, and on for a while after its last message. Raises Rejected."""
+        """Each run from its start to some time after its last message. Raises Rejected."""
         found, how = self.driver.runs([(events, 0, _end(events)) for events in runs])
         self.keep(how)
         return found
@@ -177,7 +177,7 @@ class _Work:
         self.isolation = min(self.isolation, how.isolation, key=lambda level: level.rank)
 
     def put(self, made: Sequence[Messages], *, drawn: bool = True) -> None:
-        """Ask the class, judge, count."""
+        """Run the class, judge, count."""
         if not made:
             return
         for events, run in zip(made, self.ask(made), strict=True):
@@ -206,7 +206,7 @@ class _Work:
         yield {"time": Fraction(_end(heard), SECOND)}
 
     def wrong(self, name: str, run: Run, judged: JudgedRun) -> Counterexample | None:
-        """What a run shows against a guarantee, before any assumption is broken."""
+        """A run's counterexample to a guarantee, before any assumption is violated."""
         shown, broken = judged.clauses[name].shown, judged.assumption
         if shown is not None and (broken is None or judged.clauses[name].at <= broken[0]):
             return replace(shown, explanation=f"guarantee {name} does not hold of these: {shown.explanation}")
@@ -214,10 +214,10 @@ class _Work:
             return Counterexample((), f"at message {run.after} the class raises {run.wrong}: there is no output")
         return None
 
-    # -- what refuted before -----------------------------------------------------------------------------
+    # -- earlier counterexamples -------------------------------------------------------------------------
 
     def kept(self) -> Iterator[Messages]:
-        """As far as the class still hears such messages, and the assumptions allow them."""
+        """The earlier counterexamples that the class can still receive and the assumptions allow."""
         for case in (case for found in self.job.kept.values() for case in found):
             try:
                 events = tuple(Event(str(topic), int(at), data) for topic, at, data in case)
@@ -228,10 +228,10 @@ class _Work:
             if events and same and hears and self.judge(self.recorded(events, events)).assumption is None:
                 yield events
 
-    # -- what was found ----------------------------------------------------------------------------------
+    # -- results -----------------------------------------------------------------------------------------
 
     def failed(self, obligation: Obligation) -> Outcome:
-        """The simplest run that breaks it, as it was in a process of its own."""
+        """The simplest run that violates it, as repeated in a process of its own."""
         name = obligation.name
         for events in (self.smaller(name, self.failing[name]), self.failing[name]):
             run = self.driver.run(events, 0, _end(events))
@@ -245,7 +245,7 @@ class _Work:
         return Outcome(obligation.id, Verdict.UNKNOWN, UNSTEADY, bound=self.bound())
 
     def smaller(self, name: str, best: Messages) -> Messages:
-        """Without the messages that it does not take: the last alone, halves, then one by one."""
+        """The run without unnecessary messages: first the last alone, then halves, then without one at a time."""
         end = min(self.end, time.monotonic() + tuning.SHRINKING_SECONDS)
         while len(best) > 1 and time.monotonic() < end:
             half = len(best) // 2
@@ -259,19 +259,20 @@ class _Work:
         return best
 
     def told(self, events: Messages, run: Run) -> Iterator[tuple[tuple[str, str], ...]]:
-        """A step a message: its topic, its time, its fields."""
+        """One step per message: its topic, its time, its fields."""
         for event in run.beside(events):
             at = show(Fraction(event.at, SECOND))
             yield (("(time)", f"{at} s"), *_fields(event.topic, self.driver.fields(event)))
 
     def unsteady(self) -> str:
-        """Whether another process, asked the same, is another; the last first, so that what objects share shows."""
+        """Whether another process answers the same runs differently; in reverse order, so that state shared by objects
+        shows."""
         asked = [events for events, _ in reversed(self.first)]
         same = not asked or tuple(run for _, run in reversed(self.first)) == self.ask(asked)
         return "" if same else UNSTEADY
 
     def apart(self) -> list[Counterexample]:
-        """What goes wrong where a float of a message is no number, or the negative zero: each in its turn."""
+        """The failures if one float of a message is NaN, infinite or the negative zero: each in turn."""
         tried: list[tuple[Messages, str]] = []
         for events, _ in self.first[: tuning.APART]:
             for topic in dict.fromkeys(event.topic for event in events):
@@ -291,7 +292,7 @@ class _Work:
         return list(found.values())
 
     def bound(self) -> dict[str, object]:
-        """What limits the answer."""
+        """The limits of the answer."""
         found: dict[str, object] = {"cases": self.messages, "runs": self.runs, "rejected": self.rejected}
         found |= {"replayed": self.replayed} if self.replayed else {}
         return found | {"seed": self.limits.seed}
@@ -326,7 +327,7 @@ class _Work:
 
 
 def _end(events: Sequence[Event]) -> int:
-    """How long a run goes on: timers are due after its last message."""
+    """The end of a run, in virtual time: timers are due after its last message."""
     return (events[-1].at if events else 0) + tuning.SILENCE * SECOND
 
 
@@ -340,7 +341,7 @@ def _fields(name: str, value: Any) -> Iterator[tuple[str, str]]:
 
 
 def _floats(data: Any, path: tuple[str, ...] = ()) -> Iterator[tuple[str, ...]]:
-    """The places of a message's floats; of an array the first item."""
+    """The paths of a message's floats; for an array the first item."""
     match data:
         case {"f": _}:
             yield path

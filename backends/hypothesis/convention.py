@@ -1,8 +1,8 @@
-"""Between the contract's values and what a subject gets and returns (`host` has the Python side of it).
+"""Conversion between the contract's values and the program's inputs and outputs (`host` has the Python side of it).
 
-What computes with floating-point numbers, as robots do, gets inputs that are rounded to doubles before anything is
-judged, so that judge and subject speak of the same numbers; the judge stays exact. What no REAL is (NaN, the
-infinities) is tried apart, and so is the negative zero.
+A program that computes with floating-point numbers, as robots do, gets inputs that are rounded to doubles before
+anything is judged, so that judge and program use the same numbers; the judge stays exact. Values that are not REAL
+(NaN, the infinities) are tried separately, and so is the negative zero.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ from .exchange import Pairs
 
 Inputs = dict[str, Value]
 Case = tuple[Inputs, dict[str, Value]]
-"""What a unit was given in one step, and its outputs."""
+"""A unit's inputs in one step, and its outputs."""
 
 
 class Malformed(Exception):  # noqa: N818 - it names what is wrong
-    """The subject returned something that is no value of the output's type."""
+    """The program returned something that is not a value of the output's type."""
 
 
 def sent(value: Value) -> Any:
@@ -90,7 +90,7 @@ def received(data: Any, sort: sorts.Sort, what: str) -> Value:
 
 
 def _label(pair: Any) -> str:
-    """The field that a pair of a dict is about; no text: none."""
+    """The field named by a pair of a dict; none if it is not a text."""
     return pair[0] if isinstance(pair[0], str) else ""
 
 
@@ -152,7 +152,7 @@ def _point(data: Any, parameters: Sequence[sorts.Sort], what: str) -> tuple[Valu
 
 
 def _shown(data: Any) -> str:
-    """What the subject returned, for people."""
+    """The returned data, for people."""
     match data:
         case {"?": what}:
             return str(what)
@@ -171,7 +171,7 @@ def _shown(data: Any) -> str:
 
 
 def outputs(data: Any, ports: Mapping[str, sorts.Sort]) -> dict[str, Value]:
-    """Every output from what the subject returned: a dict by name, or the one output itself. Raises Malformed."""
+    """Every output from the returned data: a dict by name, or the one output itself. Raises Malformed."""
     found: dict[str, Any] = {}
     names = set(ports)
     match data:
@@ -209,12 +209,12 @@ def pairs(inputs: Inputs, found: Mapping[str, Value]) -> Pairs:
 
 
 def asked_with(inputs: Inputs, name: str, word: str) -> Pairs:
-    """The inputs, of which one is what the word says."""
+    """The inputs, with the word as the value of one."""
     return tuple((n, word if n == f"in.{name}" else value) for n, value in pairs(inputs, {}))
 
 
 def sent_inputs(inputs: Inputs, *, doubles: bool = False) -> dict[str, Any]:
-    """Inputs as JSON data for the host; `doubles`: of rounded values, with doubles in it."""
+    """Inputs as JSON data for the host; `doubles`: the values are rounded, and numbers are sent as doubles."""
     made = {name: sent(value) for name, value in inputs.items()}
     return {name: _as_double(data) for name, data in made.items()} if doubles else made
 
@@ -223,14 +223,14 @@ def sent_inputs(inputs: Inputs, *, doubles: bool = False) -> dict[str, Any]:
 
 
 EXACT, FINITE, ANY = "exact", "float64", "float64-with-nan"
-"""The option `numbers`: fractions; doubles; doubles, and whoever fails on one that is no number is refuted."""
+"""The option `numbers`: fractions; doubles; doubles, where a failure on NaN or an infinity refutes."""
 
 SPECIAL = {"-0": "-0x0.0p+0", "NaN": "nan", "infinity": "inf", "-infinity": "-inf"}
-"""In words, and as Python reads them (`float.fromhex`)."""
+"""Names, and texts for Python (`float.fromhex`)."""
 
 
 def _as_double(data: Any) -> Any:
-    """What `sent` made of a rounded value, with doubles in it."""
+    """The result of `sent` for a rounded value, with doubles in it."""
     match data:
         case {"q": [numerator, denominator]}:
             return {"r": float(Fraction(numerator, denominator)).hex()}
@@ -238,7 +238,7 @@ def _as_double(data: Any) -> Any:
             return {key: _as_double(part) for key, part in data.items()}
         case list():
             return [_as_double(part) for part in data]
-        case _:  # no number
+        case _:  # not a number
             return data
 
 
@@ -246,7 +246,7 @@ def _as_double(data: Any) -> Any:
 
 
 def as_value(given: Any, sort: sorts.Sort) -> Value:
-    """The contract's value that the generated test drew. Raises ValueError, OverflowError: no number."""
+    """The contract's value for a drawn one. Raises ValueError or OverflowError if a float is not a number."""
     match sort:
         case sorts.BoolSort() | sorts.StringSort() | sorts.IntegerSort() | sorts.NaturalSort():
             return given  # type: ignore[no-any-return]
@@ -312,12 +312,12 @@ def as_step(value: Value, *, doubles: bool) -> Any:
             return {"t": [constructor, *(as_step(one, doubles=doubles) for one in arguments)]}
         case tuple():
             return {"t": [as_step(item, doubles=doubles) for item in value]}
-        case _:  # `subject` refuses such ports
+        case _:  # `subject` rejects such ports
             raise Malformed(f"a step class is not given {value}")
 
 
 def from_step(data: Any, but: Collection[str] = ()) -> Any:
-    """What a class returned, as the host of a function has it; `but`: names of a dict that are left out."""
+    """The returned data of a class, in the form of a function's host; `but`: names of a dict that are left out."""
     match data:
         case {"f": str(text)}:
             number = float.fromhex(text)

@@ -1,4 +1,4 @@
-"""What passes between Avow and the process that tests: what is tested there, and back what came of the cases."""
+"""The messages between Avow and the process that tests: the request, and the results of the cases."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ from avow.language.contract import Clause, Port
 QUESTION = "question.pickle"
 
 Pairs = tuple[tuple[str, str], ...]
-"""Qualified names and values, as they are shown."""
+"""Qualified names and values, as shown."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Question:
-    """What is tested, and how. It is pickled: both processes are Avow's."""
+    """The unit under test, and how to test it. It is pickled: both processes are Avow's."""
 
     test: str
     """The file's name."""
     root: Path
     path: Path
     function: str
-    """Of a driven class, how, as JSON (`avow.drive.steps`)."""
+    """For a driven class, how to drive it, as JSON (`avow.drive.steps`)."""
     driven: bool
     source: bool
     """The unit under test is the node's own class."""
@@ -37,7 +37,7 @@ class Question:
     """Steps of a run."""
     numbers: str
     names: Mapping[str, str]
-    """Of inputs: port to the generated test's name."""
+    """Input port → its name in the generated test."""
     inputs: tuple[Port, ...]
     outputs: tuple[Port, ...]
     left_out: tuple[str, ...]
@@ -47,7 +47,7 @@ class Question:
     untranslated: frozenset[str]
     """Guarantees that the generated test does not assert."""
     kept: tuple[tuple[Any, ...], ...]
-    """Cases that refuted some guarantee before: of each the inputs of its steps."""
+    """Cases that refuted some guarantee before: the inputs of each one's steps."""
 
 
 class Met(NamedTuple):
@@ -60,20 +60,20 @@ class Met(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Tried:
-    """What the cases showed of one guarantee."""
+    """The results of the cases for one guarantee."""
 
     triggers: tuple[Met, ...]
     undecided: int
     failure: Pairs | None = None
     trace: tuple[Pairs, ...] = ()
-    """The steps up to the failure, where they are more than one."""
+    """The steps up to the failure, if there are several."""
     case: Any = None
-    """What the unit was asked, to be kept."""
+    """The unit's inputs, to be kept."""
 
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """What came of it."""
+    """The results."""
 
     valid: int
     replayed: int
@@ -88,8 +88,8 @@ class Answer:
     silent: str
     crash: tuple[Pairs, str] | None
     crash_trace: tuple[Pairs, ...] | None
-    """Of the node's own class, the steps before it raised."""
+    """For the node's own class, the steps before it raised."""
     runs: int | None
-    """Where the contract remembers: then runs are what is counted."""
+    """The number of runs if the contract remembers: then runs are counted."""
     guarantees: Mapping[str, Tried]
     fault: str = ""

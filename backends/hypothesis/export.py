@@ -35,7 +35,7 @@ SCENARIO = "scenario.json"
 _NUMBERS = sorts.RealSort | sorts.IntegerSort | sorts.NaturalSort
 
 MACHINE, ADVANCE = "Runs", "advance"
-"""What `running` looks for in a generated test."""
+"""The names that `running` uses in a generated test."""
 
 
 def _helpers() -> dict[str, str]:
@@ -54,13 +54,13 @@ _RESERVED = frozenset(dir(builtins)).union(
 
 
 def cases(job: Job) -> int:
-    """How many cases the plan wants."""
+    """The number of cases in the plan."""
     wanted = job.options.get("cases", 500)
     return wanted if isinstance(wanted, int) and not isinstance(wanted, bool) and wanted > 0 else 500
 
 
 def numbers(job: Job) -> str:
-    """What a REAL is given as: of a driven class what the plan declares, unless the option says that it may be NaN."""
+    """The representation of a REAL: for a driven class as the plan declares, unless the option is given."""
     given = job.options.get("numbers")
     if job.options.get("subject") is None and job.source is not None and given is None:
         return job.source.numbers.value
@@ -72,12 +72,12 @@ def test_name(job: Job) -> str:
 
 
 def run_length(formulas: Sequence[Term]) -> int:
-    """Steps of a run: so many that what the contract's limits demand comes due."""
+    """Steps of a run: enough for the contract's time limits to expire."""
     return tuning.STEPS + min(2 * longest_limits(formulas), tuning.LONGEST_RUN)
 
 
 def files(job: Job, subject: SubjectFile) -> Mapping[str, str]:
-    """Relative path → text. Pure, but for reading the unit under test. Raises RecursionError."""
+    """Relative path → text. Pure, except that it reads the unit under test. Raises RecursionError."""
     test = _Test.of(job, subject)
     found = {test_name(job): test.text()}
     if test.strategies.tables:
@@ -112,14 +112,14 @@ class _Test:
     runs: bool
     """Whether it is tested over runs."""
     names: dict[str, str]
-    """Of inputs: port to Python's name."""
+    """Input port → its Python name."""
     before: Translator
-    """Of what is said before the unit is asked; it names nothing that this step leaves."""
+    """For formulas before the unit is called; it has no names for the state after this step."""
     after: Translator
     formulas: dict[str, Term]
-    """By the clause's name, over one step and what is kept."""
+    """By the clause's name, over one step and the remembered values."""
     kept: list[tuple[str, str, str]]
-    """What the contract remembers: name, first value, what a step leaves."""
+    """The contract's state variables: name, first value, value after a step."""
     limits: Mapping[str, Any] = field(default_factory=dict)
 
     @classmethod
@@ -162,7 +162,7 @@ class _Test:
 
     @property
     def limit(self) -> int:
-        """The most steps that the limits of one clause come to."""
+        """The largest number of steps of the limits of one clause."""
         return longest_limits(c.formula for c in (*self.job.node.assumptions, *self.guarantees))
 
     def said(self, clause: Clause) -> str | Untranslatable:
@@ -180,7 +180,7 @@ class _Test:
         body = "\n".join(self._machine() if self.runs else self._function())
         drawn = "\n".join(["", "", *self.strategies.definitions.values()])
         helpers = ""
-        for name, text in reversed(_helpers().items()):  # each stands after those that it calls
+        for name, text in reversed(_helpers().items()):  # each follows those that it calls
             if re.search(rf"\b{name}[(),]", helpers + drawn + body):
                 helpers = f"\n\n{text}\n{helpers}"
         everything = helpers + drawn + "\n\n" + body
@@ -335,7 +335,7 @@ class _Test:
 
 
 def _wrapped(said: str) -> str:
-    """A long expression in parentheses, on several lines; a text with spaces in it is not broken."""
+    """A long expression in parentheses, on several lines; not if it contains a text with spaces."""
     if len(said) < 90 or "\\" in said or any(" " in text for text in re.findall(r"""'[^']*'|"[^"]*\"""", said)):
         return said
     lines = [""]
@@ -345,7 +345,7 @@ def _wrapped(said: str) -> str:
 
 
 def _inside(wrapped: str) -> str:
-    """What stands in the parentheses of a call."""
+    """The text for the parentheses of a call."""
     return wrapped.removeprefix("(").removesuffix(")") if wrapped.startswith("(\n") else wrapped
 
 
@@ -367,7 +367,7 @@ def _plain(text: str) -> str:
 
 
 def _converted(value: str, sort: sorts.Sort) -> str:
-    """What the unit under test returned or holds, as the test compares it."""
+    """A returned or held value, as the test compares it."""
     match sort:
         case sorts.EnumSort():
             return f"named({value})"

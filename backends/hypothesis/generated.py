@@ -37,7 +37,7 @@ def loaded(bench: Bench) -> ModuleType:
 
 
 def _stand_in(bench: Bench) -> type:
-    """A class in place of the one under test, which lives in its own process."""
+    """A class in place of the one under test, which is in its own process."""
 
     class StandIn:
         def __init__(self, *_: Any) -> None:
@@ -58,7 +58,7 @@ def _stand_in(bench: Bench) -> type:
 
 
 def observed(machine: Any, bench: Bench) -> Any:
-    """The generated state machine, each of whose steps the bench judges."""
+    """The generated state machine; the bench judges each step."""
 
     class Observed(machine):  # type: ignore[misc]
         def __init__(self) -> None:

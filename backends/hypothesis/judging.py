@@ -1,4 +1,4 @@
-"""Clauses ready to be judged of many cases, and the triggers without which a guarantee says nothing."""
+"""Clauses prepared to be judged on many cases, and the triggers without which a guarantee is vacuous."""
 
 from __future__ import annotations
 
@@ -21,21 +21,21 @@ from .tuning import CONFIDENCE
 
 @dataclass(frozen=True, slots=True)
 class Judged(Formula):
-    """A formula, ready to be judged of many cases."""
+    """A formula, prepared to be judged on many cases."""
 
     text: str
     ports: tuple[str, ...]
-    """Inputs that it speaks of."""
+    """The inputs in it."""
 
 
 @dataclass(slots=True)
 class Guarantee:
-    """A guarantee and its triggers: the conditions that each have to be met by some case."""
+    """A guarantee and its triggers: conditions, each of which some case has to meet."""
 
     judged: Judged
     triggers: tuple[Judged, ...]
     parts: tuple[tuple[Judged, ...], ...]
-    """Of each trigger, what it is made of: the more of it holds, the nearer a case is."""
+    """The parts of each trigger: the more parts hold, the nearer a case is."""
     hits: list[int]
     """How often each trigger was met."""
     run_hits: list[int]
@@ -44,14 +44,14 @@ class Guarantee:
 
 
 def judged(name: str, formula: Term, records: Records) -> Judged:
-    """A clause; what it remembers of other steps is among the records."""
+    """A clause; its memory of other steps is among the records."""
     made = Formula.made(name, records.clause(formula) if histories(formula) else formula)
     ports = sorted(v.name for v in free_variables(made.term) if v.role is Role.INPUT and CELL not in v.name)
     return Judged(name, made.term, made.evaluator, _shown(formula), tuple(ports))
 
 
 def guarantee(name: str, formula: Term, records: Records) -> Guarantee:
-    """The guarantee with its triggers; of a response, that all of what it demands came due."""
+    """The guarantee with its triggers; for a response, that its whole demand became due."""
     response = due(formula)
     parts: list[tuple[Judged, ...]] = []
     if response is None:
@@ -74,7 +74,7 @@ def _shown(formula: Term) -> str:
 
 
 def failure_bound(cases: int) -> float:
-    """With 95 % confidence, no more than this part of such cases fails, none of so many having failed (1 - 0.05^(1/n);
+    """With 95 % confidence, no more than this part of such cases fails if none of so many failed (1 - 0.05^(1/n);
     "rule of three": about 3/n), rounded up to six decimals."""
     return 1.0 if cases == 0 else math.ceil((1 - math.pow(1 - CONFIDENCE, 1 / cases)) * 10**6) / 10**6
 

@@ -1,9 +1,9 @@
 """Runs a generated test as Avow does: under Hypothesis, with the unit under test in a process of its own.
 
-The test's import finds a stand-in, which asks that process; the test's own strategies, assumptions and steps decide
-what it is asked. Each case is judged by exact evaluation (and Z3 where that cannot answer), for every guarantee and
-condition at once; what the test's assertions say of the same case has to agree. Where a guarantee fails, Hypothesis
-runs the test again to find the simplest case.
+The test's import finds a stand-in, which calls that process; the test's own strategies, assumptions and steps decide
+the inputs. Each case is judged by exact evaluation (and Z3 if that cannot answer), for every guarantee and condition at
+once; the test's assertions on the same case have to agree. If a guarantee fails, Hypothesis runs the test again to find
+the simplest case.
 """
 
 from __future__ import annotations
@@ -59,22 +59,22 @@ from .tuning import APART, BATCH, REJECTED_CASES, SHRINKING_SECONDS
 from .unit import Unit
 
 # Hypothesis looks for constants in the source of all modules that it takes for the user's. Here these are Avow's own,
-# and only where it is not installed as a package: slow, of no use, and the same seed would draw other cases elsewhere.
+# and only if it is not installed as a package: slow, useless, and the same seed would draw other cases elsewhere.
 setattr(providers, "is_local_module_file", lambda path: False)  # noqa: B010 - it is not exported
 
 Trace = list[Case]
 
 
 class _Stop(BaseException):
-    """The cases end early; its text is why. Hypothesis passes it through, or says `Flaky` in its place."""
+    """The cases end early; the text is the reason. Hypothesis passes it through, or raises `Flaky` instead."""
 
 
 class _Broken(Exception):  # noqa: N818 - it is what Hypothesis shrinks
-    """What is being made simpler fails here."""
+    """The guarantee (or crash) that is being simplified fails here."""
 
 
 def main() -> None:
-    """``run.py CHANNEL SECONDS SEED``, in a folder with the test and the pickled question."""
+    """``run.py CHANNEL SECONDS SEED``, in a folder with the test and the pickled request."""
     channel, seconds, start = int(sys.argv[1]), float(sys.argv[2]), int(sys.argv[3])
     os.set_inheritable(channel, False)
     adopt_orphans()
@@ -83,7 +83,7 @@ def main() -> None:
 
 
 class Bench:
-    """One node's contract, a unit under test, and the counts of what was tried."""
+    """One node's contract, a unit under test, and the counts of the cases tried."""
 
     def __init__(self, asked: Question, seconds: float, start: int) -> None:
         self.asked, self.seed = asked, start
@@ -101,18 +101,18 @@ class Bench:
         self.unit = Unit(asked, patience)
         self.valid = self.rejected = self.undecided = self.replayed = self.runs = 0
         self.traces: dict[str, Trace] = {}
-        """Guarantee → a run up to the step that breaks it; of a function, its one step."""
+        """Guarantee → a run up to the step that violates it; for a function, its one step."""
         self.trace: Trace = []
         self.crash: str = ""
         self.crash_trace: Trace = []
         self.silent = self.differs = ""
         self.unsteady: Inputs | None = None
         self.shrinking: str | None = None
-        """The guarantee that is being made to fail more simply; empty: the crash; None where cases are counted."""
+        """The guarantee whose failure is being simplified; empty: the crash; None while cases are counted."""
         self._why: str | None = None
         """Why the cases ended early, if they did."""
         self._over = False
-        """Whether the run is: a state machine does not go on after an assertion that failed."""
+        """Whether the run is over: a state machine does not continue after a failed assertion."""
         self.memory: dict[str, Value] = {}
         self._drawn: Inputs = {}
         self.found: dict[str, Value] | None = None
@@ -130,7 +130,7 @@ class Bench:
         return {name: as_plain(value, table) for name, value in found.items()}
 
     def ask_here(self) -> dict[str, Value]:
-        """The unit's outputs for the drawn inputs, if the assumptions certainly hold of these."""
+        """The unit's outputs for the drawn inputs, if these certainly satisfy the assumptions."""
         if not self._assumed(self._drawn):
             reject()
         self.found = self.unit.advance(self._drawn)
@@ -185,7 +185,7 @@ class Bench:
                 each.run_hits = [n + (now > was) for n, now, was in zip(each.run_hits, each.hits, before, strict=True)]
 
     def case(self, drawn: Mapping[str, Any], test: Callable[[], None]) -> None:
-        """One case, or one step of a run: the test is called, and what came of it is judged."""
+        """One case, or one step of a run: the test is called, and the result is judged."""
         if self._over:
             return
         if time.monotonic() > self.end:
@@ -206,7 +206,7 @@ class Bench:
             pass
         except SubjectFailed as error:
             self._crashed(str(error), [*self.trace, (self._drawn, {})])
-        except Exception as error:  # whatever the test's own lines raise, it is no agreement
+        except Exception as error:  # any exception of the test's own lines counts as a complaint
             complaint = str(error) or type(error).__name__
         if self.found is None:
             self.rejected += self.shrinking is None
@@ -228,7 +228,7 @@ class Bench:
         return self._tables[id(given)][1]
 
     def _all_met(self) -> bool:
-        """Whether each condition was met, as far as there is hope."""
+        """Whether each condition was met, or too many cases were tried."""
         unmet = any(0 in each.hits for each in self.guarantees.values())
         return not unmet or self.valid >= tuning.MORE_CASES * self.asked.cases
 
@@ -275,7 +275,7 @@ class Bench:
         self.undecided += None in held and False not in held
         return all(one is True for one in held)
 
-    # -- what came of it ---------------------------------------------------------------------------------
+    # -- results -----------------------------------------------------------------------------------------
 
     def answer(self) -> Answer:
         stopped, apart = "", list[tuple[Pairs, str]]()
@@ -306,7 +306,7 @@ class Bench:
         )  # fmt: skip
 
     def _sweep(self) -> str:
-        """The cases that count; why they ended early, if they did."""
+        """Run the cases that count; the reason if they ended early."""
         self._why = None
         try:
             self._run_test((Phase.generate, Phase.target))
@@ -322,8 +322,8 @@ class Bench:
         return ""
 
     def _simplify(self, name: str) -> None:
-        """The simplest run that breaks a guarantee (or in which the unit fails), as far as Hypothesis finds it in time,
-        and as it comes about in a process of its own."""
+        """Find the simplest run that violates a guarantee (or in which the unit fails), within the time, and repeat it
+        in a process of its own."""
         first, end = self.traces.get(name, []), self.end
         self.shrinking, self.end = name, min(end, time.monotonic() + SHRINKING_SECONDS)
         with contextlib.suppress(_Broken, _Stop, Flaky, Unsatisfiable, FailedHealthCheck):
@@ -341,7 +341,7 @@ class Bench:
 
     @contextlib.contextmanager
     def _twin(self) -> Iterator[Unit]:
-        """Another process of the unit, which takes its place."""
+        """Another process of the unit, used in its place."""
         first, self.unit = self.unit, Unit(self.asked, self.unit.patience)
         try:
             yield self.unit
@@ -352,7 +352,8 @@ class Bench:
             self.silent = self.silent or twin.silent
 
     def _replayed(self, steps: Iterable[Inputs], *names: str) -> dict[str, Trace]:
-        """Of those guarantees that the run of these steps breaks, the run up to there, as far as it is allowed."""
+        """For each guarantee that the run of these steps violates, the run up to there, as far as the assumptions allow
+        it."""
         trace: Trace = []
         broken: dict[str, Trace] = {}
         self.keeper.restart()
@@ -375,7 +376,7 @@ class Bench:
         return broken
 
     def _replay_kept(self) -> None:
-        """First of all, whatever the seed, what refuted a guarantee before; as far as it is still a case."""
+        """Run the earlier counterexamples that are still valid cases; they come first, with any seed."""
         for run in self.asked.kept:
             steps: list[Inputs] = []
             with contextlib.suppress(Malformed, KeyError, ValueError, TypeError, AttributeError):
@@ -387,16 +388,16 @@ class Bench:
                 self.traces = {**self._replayed(steps, *self.guarantees), **self.traces}
 
     def _hold(self) -> None:
-        """The first inputs of a few runs, held: what counts, or waits, comes to its end."""
+        """Repeat the first inputs of a few runs, so that counters and delays expire."""
         for inputs in self._starts if self._runs and not self.crash else ():
             left = [name for name in self.guarantees if name not in self.traces]
             if left and time.monotonic() < self.end:
                 self.traces |= self._replayed(itertools.repeat(inputs, tuning.LONGEST_RUN), *left)
 
     def _asked_again(self) -> Inputs | None:
-        """Inputs to which another process, asked the same from its start, gives another answer, or, asked often, one
-        that breaks a guarantee: what comes of clock, chance, place in memory or the number of calls is no function of
-        what was recorded."""
+        """Inputs to which another process, given the same requests from its start, gives another answer, or, called
+        often, one that violates a guarantee: answers that depend on clock, chance, memory addresses or the number of
+        calls are not a function of the recorded inputs."""
         requests = self.unit.requests
         short = [] if self.asked.driven else sorted(requests, key=lambda request: len(str(request)))[: BATCH // 2]
         twice = [request for request in short for _ in range(2)]
@@ -414,7 +415,7 @@ class Bench:
         return None
 
     def _breaks(self, inputs: Inputs, reply: Any) -> bool:
-        """Whether a function's reply to these inputs breaks a guarantee, or is none."""
+        """Whether a function's reply to these inputs violates a guarantee, or is unreadable."""
         try:
             found = self.unit.read(reply)
         except SubjectFailed:
@@ -423,7 +424,7 @@ class Bench:
         return any(g.judged.holds(self.keeper.at(valuation(inputs, found))) is False for g in self.guarantees.values())
 
     def _asked_apart(self) -> list[tuple[Pairs, str]]:
-        """Each REAL input in its turn is what no REAL is, or the negative zero, beside a few cases' other inputs."""
+        """Each REAL input in turn is NaN, infinite or the negative zero, with a few cases' other inputs."""
         found: dict[str, tuple[Pairs, str]] = {}
         reals = [n for n, s in self.inputs.items() if n not in self.asked.held and isinstance(s, RealSort)]
         with self._twin():
@@ -439,7 +440,7 @@ class Bench:
         return list(found.values())
 
     def _wrong_apart(self, inputs: Inputs, name: str, text: str) -> str:
-        """Of an input that has no value no guarantee that speaks of it can be judged; the negative zero is zero."""
+        """Guarantees about an input without a value cannot be judged; the negative zero is zero."""
         try:
             self.unit.begin()
             found = self.unit.advance(inputs, {name: text})

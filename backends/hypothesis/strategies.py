@@ -21,7 +21,7 @@ from .translate import number, safe_name
 
 Rows = tuple[tuple[str, ...], ...]
 Column = tuple[sorts.Sort, ...]
-"""The sorts of neighbouring columns that belong together: (REAL, REAL) is a place."""
+"""The sorts of neighbouring columns that belong together: (REAL, REAL) is a position."""
 
 
 def bounds(assumptions: Iterable[Term]) -> dict[str, tuple[Fraction | None, Fraction | None]]:
@@ -69,7 +69,7 @@ class Strategies:
             self._table(name, sort)
 
     def port(self, name: str, sort: sorts.Sort, limits: tuple[Fraction | None, Fraction | None] = (None, None)) -> str:
-        """What an input is drawn from."""
+        """The strategy of an input."""
         if name in self.tables:
             return f"st.just({_constant(name)})"
         if isinstance(sort, sorts.RealSort | sorts.IntegerSort | sorts.NaturalSort):
@@ -82,7 +82,7 @@ class Strategies:
     # -- by sort -----------------------------------------------------------------------------------------
 
     def _of(self, sort: sorts.Sort, *, few: bool) -> str:
-        """`few`: a value that is to be the same as another now and then."""
+        """`few`: a value that should sometimes equal another."""
         match sort:
             case sorts.BoolSort():
                 return "st.booleans()"
@@ -125,7 +125,7 @@ class Strategies:
         return f"({drawn} | st.sampled_from({self._column((sort,))}))" if (sort,) in self._known else drawn
 
     def _row(self, parameters: Column, constructor: str = "") -> str:
-        """A tuple, with the name of a constructor before it; now and then of a row of the scenario."""
+        """A tuple, with the name of a constructor before it; sometimes from a row of the scenario."""
         before = [f"st.just({constructor!r})"] if constructor else []
         if len(parameters) == 1:
             return f"st.tuples({', '.join([*before, self._few_or_known(parameters[0])])})"
@@ -164,7 +164,7 @@ class Strategies:
         self.definitions.setdefault(name, f"{name} = {made}")
 
     def _few(self, sort: sorts.Sort) -> str:
-        """A number that is to be the same as another now and then."""
+        """A number that should sometimes equal another."""
         few = self.thresholds.few
         if isinstance(sort, sorts.RealSort):
             shown = ", ".join(_shown(_as_double(n) if self.doubles else n) for n in few)
@@ -237,12 +237,12 @@ def _is_cell(text: str, sort: sorts.Sort) -> bool:
             return text.upper() in ("TRUE", "FALSE")
         case sorts.EnumSort(members=members):
             return text in members
-        case _:  # a text, or what no cell holds
+        case _:  # a text, or a sort without cells
             return isinstance(sort, sorts.StringSort)
 
 
 def _shown(value: Fraction | float) -> str:
-    """What Python's `Fraction` makes the number of, as short as it can be said."""
+    """The shortest argument of Python's `Fraction` for the number."""
     if not isinstance(value, Fraction) or value.denominator == 1:
         return str(value) if isinstance(value, Fraction) else repr(value)
     text = decimal(value)

@@ -1,4 +1,4 @@
-"""The plan's subject, looked at without running it: the file, the function, the names of its arguments."""
+"""The plan's program under test, read without running it: the file, the function, the names of its arguments."""
 
 from __future__ import annotations
 
@@ -38,9 +38,9 @@ class SubjectFile:
     name: str
     path: Path
     function: str
-    """The function; of a class that is driven, how, as JSON (`avow.drive.steps`)."""
+    """The function; for a driven class, how to drive it, as JSON (`avow.drive.steps`)."""
     held: Mapping[str, str] = field(default_factory=dict)
-    """Of a driven class, the attribute that holds each port of its memory."""
+    """For a driven class, the attribute that holds each port of its memory."""
     driven: bool = False
     source: bool = False
     """Whether it is the node's own class."""
@@ -50,7 +50,7 @@ class SubjectFile:
     accepted: frozenset[str] | None = None
     """The inputs that it takes by name; None: all."""
     left_out: frozenset[str] = frozenset()
-    """Ports by qualified name that no clause speaks of: inputs that the class is not given, outputs not looked at."""
+    """Qualified names of ports in no clause: inputs that the class is not given, outputs that are not read."""
 
     @property
     def memory(self) -> tuple[str, ...]:
@@ -61,7 +61,7 @@ class SubjectFile:
 
 
 def subject(job: Job) -> SubjectFile:
-    """Raises Rejected (codes ``HYPO1…``): no such option, file or function, or arguments that are no inputs."""
+    """Raises Rejected (codes ``HYPO1…``): no such option, file or function, or arguments that are not inputs."""
     found = locate(job)
     place = job.method.options.at("subject")
     try:
@@ -99,7 +99,7 @@ def subject(job: Job) -> SubjectFile:
 
 
 def _step_class(found: SubjectFile, definition: ast.ClassDef, step: ast.FunctionDef, job: Job) -> SubjectFile:
-    """A class with a method `step` that the option names: made without arguments, once for each run. Raises
+    """A class with a method `step` that the option names: constructed without arguments, once for each run. Raises
     Rejected."""
     begun = _method(definition, "__init__")
     problems = _arguments(step, found, job, method=True)
@@ -122,7 +122,7 @@ def _step_class(found: SubjectFile, definition: ast.ClassDef, step: ast.Function
 
 
 def _without(found: SubjectFile, step: ast.FunctionDef | None, job: Job) -> SubjectFile:
-    """The node's own class, without the ports of no plain type that no clause speaks of; but of an input only where
+    """The node's own class, without the ports of other than plain types that no clause mentions; an input only if
     `step` does not take it. Raises Rejected."""
     clauses = (*job.node.assumptions, *map(job.clause, job.obligations))
     spoken = {v.qualified for clause in clauses for v in free_variables(clause.formula)}
@@ -204,7 +204,7 @@ def parameter_files(job: Job) -> tuple[Path, ...]:
 
 
 def _unfit(ports: Mapping[str, Sort]) -> str:
-    """The first port whose values no step class is given; empty where there is none."""
+    """The first port whose values cannot be given to a step class; empty if there is none."""
     for name, sort in ports.items():
         if not _plain(sort):
             return name
@@ -227,7 +227,7 @@ _PLAIN = (BoolSort, EnumSort, IntegerSort, NaturalSort, RealSort)
 
 
 def modules(path: Path) -> tuple[Path, ...]:
-    """The subject's file and the files beside it that it imports, directly or not: what its answers depend on."""
+    """The program's file and the files beside it that it imports, directly or not: its answers depend on them."""
     found: dict[Path, None] = {}
     stack = [path]
     while stack:

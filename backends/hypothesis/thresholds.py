@@ -21,27 +21,27 @@ from avow.language.terms import Arithmetic, Compare, Literal, Negative, Term, Wi
 from . import tuning
 
 _STEP = Fraction(1, 1000)
-"""How close to a threshold a value is tried on either side."""
+"""The distance from a threshold at which a value is tried on either side."""
 
 
 _Sum = dict[Term | None, Fraction]
-"""The coefficients of what is no arithmetic, and the constant under None."""
+"""The coefficients of non-arithmetic terms, and the constant under None."""
 
 
 @dataclass(frozen=True, slots=True)
 class Thresholds:
-    """The simplest value of each comes first: it is what a failing case is shrunk towards. `few` are the constants of
+    """The simplest value of each comes first: failing cases are shrunk towards it. `few` are the constants of
     the contract and small numbers, so few that two draws often meet."""
 
     constants: tuple[Fraction, ...]
-    """What contract and program write down."""
+    """Constants in contract and program."""
     numbers: tuple[Fraction, ...]
-    """What lies around these, and what is calculated from them."""
+    """Numbers near these, and numbers calculated from them."""
     few: tuple[Fraction, ...]
     texts: tuple[str, ...]
-    """The texts of contract and program, and what a careless comparison takes for them."""
+    """The texts of contract and program, and texts that a careless comparison confuses with them."""
     words: tuple[str, ...]
-    """What other texts are put together from."""
+    """The parts from which other texts are composed."""
     lengths: tuple[int, ...]
 
 
@@ -91,15 +91,15 @@ def _shortest(texts: Iterable[str]) -> tuple[str, ...]:
 
 
 def _variants(text: str) -> Iterator[str]:
-    """Texts that a careless comparison takes for this one; the last two look alike."""
+    """Texts that a careless comparison confuses with this one; the last two look alike."""
     yield from (f" {text}", f"{text} ", text.upper(), text.capitalize(), f"{text}x", f"x{text}", text[:-1], text[::-1])
     yield f"{text[:1]}\u200b{text[1:]}"
     yield "".join(chr(ord(letter) + 0xFEE0) if "!" <= letter <= "~" else letter for letter in text)
 
 
 def _constants(program: Iterable[Path]) -> Iterator[Fraction | str]:
-    """The numbers and short texts that Python sources write down: calculated ones (``2 * LIMIT + 1``) among them, and
-    those of the data files that they name."""
+    """The numbers and short texts in Python sources, including calculated ones (``2 * LIMIT + 1``) and those of the
+    data files that they name."""
     for path in program:
         try:
             tree = ast.parse(text_or_nothing(path))
@@ -118,13 +118,13 @@ def _constants(program: Iterable[Path]) -> Iterator[Fraction | str]:
                     yield Fraction(value)
                 case float() if abs(value) <= tuning.LARGEST_CONSTANT:
                     yield Fraction(repr(value))
-                    yield Fraction(value)  # as the machine has it
+                    yield Fraction(value)  # its value as a double
                 case str() if len(value) <= tuning.LONGEST_TEXT:
                     yield value
 
 
 class _Named(ast.NodeTransformer):
-    """Puts their values in the place of a module's named constants and of `math.pi`, so that Python calculates."""
+    """Replaces a module's named constants and `math.pi` by their values, so that Python calculates."""
 
     def __init__(self, tree: ast.Module) -> None:
         self.known: dict[str, Any] = {}
@@ -173,7 +173,7 @@ def _neighbours(number: Fraction) -> Iterator[Fraction]:
 
 
 def _meeting(comparison: Compare) -> set[Fraction]:
-    """Where the two sides meet, if all that is open is one value: ``4 * gauge < 20`` has its threshold at 5."""
+    """Where the two sides are equal, if there is a single unknown: ``4 * gauge < 20`` has its threshold at 5."""
     left, right = _linear(comparison.left), _linear(comparison.right)
     apart = _plus(left, right, Fraction(-1)) if left is not None and right is not None else {}
     slopes = [slope for part, slope in apart.items() if part is not None]
@@ -190,7 +190,7 @@ def _plus(one: _Sum, other: _Sum, factor: Fraction) -> _Sum:
 
 
 def _linear(term: Term) -> _Sum | None:
-    """A sum over what is no arithmetic; None if it is not linear in it."""
+    """The term as a sum over non-arithmetic terms; None if it is not linear in them."""
     match term:
         case Literal(value=bool() | str()):
             return None

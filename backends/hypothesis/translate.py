@@ -2,7 +2,7 @@
 
 A quantifier over infinitely many values becomes a comprehension over the values that its guards name: the points of a
 relation, the arguments of a command, a range. A formula whose guards name none raises `Untranslatable`: Avow judges it
-all the same, by exact evaluation, and the generated test says so.
+all the same, by exact evaluation, and the generated test has a comment on it.
 """
 
 from __future__ import annotations
@@ -23,15 +23,15 @@ from avow.language.sorts import BoolSort, EnumSort, IntegerSort, NaturalSort, Re
 from .tuning import ALTERNATIVES
 
 _OR, _AND, _NOT, _COMPARE, _ADD, _MULTIPLY, _SIGN, _ATOM = range(1, 9)
-"""How tightly Python binds, loosest first."""
+"""Python's precedences, loosest first."""
 
 
 class Untranslatable(Exception):  # noqa: N818 - it names what is wrong
-    """No plain Python says the formula; the text is why, for people."""
+    """The formula has no plain Python form; the text is the reason, for people."""
 
 
 def safe_name(name: str, taken: Iterable[str] = ()) -> str:
-    """An identifier for a name of the contract, unlike those that are taken."""
+    """An identifier for a name of the contract, different from those taken."""
     found = as_identifier(name).lstrip("_") or "x"
     found = f"x{found}" if found[0].isdigit() else found
     while keyword.iskeyword(found) or found in taken:
@@ -49,10 +49,10 @@ def number(value: Fraction | int) -> str:
 
 
 Branch = tuple[tuple[t.Variable, ...], tuple[t.Term, ...]]
-"""Variables that exist, and what holds of them together."""
+"""Existential variables, and their joint conditions."""
 
 Binding = tuple[str, set[t.Variable]]
-"""A loop, and the variables to which it gives values."""
+"""A loop, and the variables that it binds."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,7 +80,7 @@ class Translator:
         return f"{name}({self._joined(parts, ', ', _OR)})", _ATOM
 
     def _text(self, term: t.Term) -> tuple[str, int]:
-        """The expression, and how tightly it binds."""
+        """The expression, and its precedence."""
         if self.known and term in self.known:
             return self.known[term], _ATOM
         match term:
@@ -180,7 +180,7 @@ class Translator:
                 return f"{self._at(arguments[0], _SIGN)} // {self._at(arguments[1], _SIGN)}", _MULTIPLY
 
     def _conjunction(self, items: Sequence[t.Term]) -> str:
-        """``0 <= x and x < 9`` as the chain that it is."""
+        """``0 <= x and x < 9`` as a chain of comparisons."""
         parts: list[str] = []
         end: t.Term | None = None
         for item in items:
@@ -246,7 +246,7 @@ class Translator:
         return f"not ({self._exists(variables, negation(body))[0]})", _NOT
 
     def _each(self, variables: Sequence[t.Variable], given: t.Term, demanded: t.Term) -> str:
-        """That something is demanded wherever something is given."""
+        """That `demanded` holds wherever `given` holds."""
         found: list[str] = []
         for inside, items in _branches(given, True, variables):
             scope = self._binding(v for v in inside if v.qualified not in self.names)
@@ -280,7 +280,7 @@ class Translator:
         return _Loops(before, " ".join(text), ready)
 
     def _binder(self, items: Sequence[t.Term], unbound: Sequence[t.Variable]) -> tuple[t.Term | None, Binding]:
-        """A loop over the values of some variables, and the part that names these values."""
+        """A loop over the values of some variables, and the part that determines these values."""
         for way in (self._equal, self._row_of, self._member, self._below):
             for item in items:
                 found = way(item, items, unbound)
@@ -302,7 +302,7 @@ class Translator:
     def _pattern(
         self, parts: Sequence[t.Term], unbound: Sequence[t.Variable]
     ) -> tuple[list[str], str, set[t.Variable]] | None:
-        """Names for the parts of a row, what is to be checked of them, and the variables among them."""
+        """Names for the parts of a row, the checks on them, and the variables among them."""
         names: list[str] = []
         checks: list[str] = []
         bound: set[t.Variable] = set()
@@ -368,8 +368,8 @@ class Translator:
 
 @dataclass(frozen=True, slots=True)
 class _Loops:
-    """The loops over the values of some variables. `before`: what has to hold before any has a value; `last`: what has
-    to hold of all of them."""
+    """The loops over the values of some variables. `before`: conditions without these variables; `last`: conditions on
+    all of them."""
 
     before: Sequence[t.Term]
     text: str
@@ -380,7 +380,7 @@ class _Loops:
 
 
 def _bound(item: t.Term, unbound: Sequence[t.Variable], *, above: bool) -> tuple[t.Variable, t.Term, bool] | None:
-    """The whole number that a comparison bounds from above (or below), by what, and whether strictly."""
+    """The whole number that a comparison bounds from above (or below), the bound, and whether it is strict."""
     if not isinstance(item, t.Compare) or item.operator not in ("<", "<=", ">", ">="):
         return None
     less = item.operator in ("<", "<=")
@@ -392,7 +392,7 @@ def _bound(item: t.Term, unbound: Sequence[t.Variable], *, above: bool) -> tuple
 
 
 def _branches(term: t.Term, positive: bool, variables: Sequence[t.Variable] = ()) -> list[Branch]:
-    """The alternatives under which a formula (or its negation) holds. Raises Untranslatable: there are too many."""
+    """The alternatives under which a formula (or its negation) holds. Raises Untranslatable if there are too many."""
     found = [((*variables, *inside), items) for inside, items in _alternatives(term, positive)]
     if len(found) > ALTERNATIVES:
         raise Untranslatable("it has too many alternatives")
@@ -423,7 +423,7 @@ def _alternatives(term: t.Term, positive: bool) -> list[Branch]:
             return _branches(body, False, variables)
         case t.Compare(operator=operator, left=left, right=right) if not positive:
             return [((), (t.Compare(OPPOSITE[operator], left, right),))]
-        case _:  # a part that is not taken apart
+        case _:  # a part that is not decomposed
             return [((), (term if positive else negation(term),))]
 
 

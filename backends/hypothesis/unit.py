@@ -1,4 +1,4 @@
-"""The unit under test, in a process of its own: what it is given, and what it answers, in the contract's values."""
+"""The unit under test, in a process of its own: its inputs and answers, in the contract's values."""
 
 from __future__ import annotations
 
@@ -51,14 +51,14 @@ class Unit:
             raise SubjectFailed(str(error)) from error
 
     def memory(self, found: Mapping[str, Value]) -> dict[str, Value]:
-        """What it holds after a step with these outputs."""
+        """Its memory after a step with these outputs."""
         names = [n for n in self.asked.held if n in self.inputs]
         if all(n in found for n in names):
             return {n: found[n] for n in names}
         return self._held(self._drive({"on": True, "steps": []})["held"])
 
     def step_of(self, inputs: Inputs) -> dict[str, Any]:
-        """Inputs as a driven class is given them."""
+        """Inputs in the form for a driven class."""
         return {n: as_step(v, doubles=self.doubles) for n, v in inputs.items() if n not in self.asked.held}
 
     def request(self, request: Any) -> Any:
@@ -82,7 +82,7 @@ class Unit:
             raise SubjectFailed("the unit's answer cannot be read") from error
 
     def inputs_of(self, request: Mapping[str, Any]) -> Inputs:
-        """What a request gave, as far as it can be read."""
+        """The inputs in a request, as far as they can be read."""
         plain = request if not self.asked.driven else (json.loads(request["case"])["steps"] or [{}])[0]
         found: Inputs = {}
         for name, data in plain.items():
@@ -93,7 +93,7 @@ class Unit:
         return found
 
     def differing(self, before: Sequence[tuple[Any, Any]]) -> Iterator[tuple[Inputs, Any]]:
-        """The inputs of requests that have another reply now, and that reply."""
+        """The inputs of requests whose reply differs now, and the new reply."""
         again = self.process.ask_all([request for request, _ in before])
         for (request, reply), other in itertools.zip_longest(before, again):
             if other != reply and self.differ(reply, str(other) if isinstance(other, SubjectFailed) else other):
@@ -109,7 +109,7 @@ class Unit:
             return True
 
     def _drive(self, case: Mapping[str, Any]) -> Any:
-        """What the driver of a class answers."""
+        """The answer of a class's driver."""
         reply = self.request({"case": json.dumps(case)})
         if not isinstance(reply, str):
             raise SubjectFailed("the class cannot be driven")
