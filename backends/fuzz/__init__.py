@@ -1,4 +1,4 @@
-"""A node's C++ source, fuzzed with sanitizers; what is new among its runs is run again, alone, and judged exactly."""
+"""A node's C++ source, fuzzed with sanitizers; runs with new coverage are repeated, alone, and judged exactly."""
 
 from __future__ import annotations
 

@@ -23,7 +23,7 @@ from .tuning import BUILD_MEGABYTES, BUILD_SECONDS
 from .unseen import Line, Unseen, own, undefined, unseen
 
 LINK = "avow-adapter.hpp"
-"""The adapter by another name: its own path may hold what no line of C++ can say."""
+"""A link to the adapter: its own path may contain characters that C++ cannot include."""
 _COMMON = (
     "-std=c++17",
     "-g1",
@@ -45,23 +45,23 @@ _SANITIZED = (
     "-D_GLIBCXX_ASSERTIONS",
 )
 _PLAIN = ("-O2",)
-# Without sanitizers' builds the plain program itself ends by a signal where its behaviour is undefined.
+# Without sanitizers' builds the plain program itself ends by a signal if its behaviour is undefined.
 _TRAPPED = ("-fsanitize=undefined", "-fsanitize-trap=undefined", "-D_LIBCPP_HARDENING_MODE=_LIBCPP_HARDENING_MODE_FAST")
 _FILLED = ("-ftrivial-auto-var-init=pattern", "-DAVOW_FILLED")
 _FUZZED = ("-fsanitize=fuzzer,address,undefined", "-fno-sanitize-coverage=trace-cmp")
 
 
 class Build(StrEnum):
-    """What is built, by the name of the program."""
+    """The builds, by the name of the program."""
 
     FUZZED = "fuzz"
     """The harness."""
     SANITIZED = "sanitized"
-    """The plain program with sanitizers: what tells where a fault is."""
+    """The plain program with sanitizers: it reports where a fault is."""
     PLAIN = "replay"
     """The program whose answers are judged."""
     FILLED = "filled"
-    """The plain program, in which variables and memory that nothing was written to hold other bytes."""
+    """The plain program, in which uninitialised variables and memory hold other bytes."""
 
 
 _FLAGS = {
@@ -73,17 +73,17 @@ _FLAGS = {
 
 
 class NotBuilt(Exception):  # noqa: N818 - it names what happened
-    """The compiler refuses the source; the message is its first error."""
+    """The compiler rejects the source; the message is its first error."""
 
 
 @dataclass(frozen=True, slots=True)
 class Built:
-    """What one build made, and what it read."""
+    """The result of one build, and the files that it read."""
 
     program: Path
     read: tuple[Path, ...]
     asked: tuple[str, ...] = ()
-    """The names that its objects leave to libraries to define."""
+    """The undefined names in its objects."""
 
 
 def write(reading: Reading, made: Drawable, folder: Path) -> None:
@@ -94,7 +94,8 @@ def write(reading: Reading, made: Drawable, folder: Path) -> None:
 
 
 def looked_into(reading: Reading, folder: Path, outside: Outside, asked: Iterable[str], seconds: float) -> Unseen:
-    """What no run shows of the source; `asked` as the plain build has it. Raises NotBuilt and ToolMissing."""
+    """The parts of the source's behaviour that no run shows; `asked` are the plain build's undefined names. Raises
+    NotBuilt and ToolMissing."""
     alone = _preprocessed(reading, folder, outside, _flags(Build.PLAIN), seconds)
     fuzzed = Build.FUZZED if fuzzes(_there()) else Build.PLAIN
     found = unseen(alone, _preprocessed(reading, folder, outside, _flags(fuzzed), seconds), asked)
@@ -126,7 +127,7 @@ def _there() -> Tool:
 
 
 def missing(tool: Tool) -> str:
-    """What is missing, and the command that installs it."""
+    """The missing tool, and the command that installs it."""
     return f"clang++ is {'not here' if tool.path is None else 'here without libFuzzer'}: {tool.install}"
 
 
@@ -166,12 +167,12 @@ def _clang(tool: Tool, words: list[str], folder: Path, outside: Outside, seconds
         limit = max(5.0, min(seconds, BUILD_SECONDS))
         return outside.run([str(tool.path), *words], cwd=folder, seconds=limit, megabytes=BUILD_MEGABYTES)
     kept = {f"ZIG_{which}_CACHE_DIR": str(_wheel_cache()) for which in ("GLOBAL", "LOCAL")}
-    # its first build builds the standard library: a minute of processor time
+    # its first run builds the standard library: a minute of processor time
     return outside.run([str(tool.path), "c++", *words], cwd=folder, seconds=max(5.0, seconds), env=kept)
 
 
 def _wheel_cache() -> Path:
-    """Where the wheel's compiler keeps the standard library that it has built."""
+    """The folder of the standard library that the wheel's compiler has built."""
     return cache_folder() / "zig"
 
 
@@ -185,7 +186,7 @@ def _first(done: Completed, reading: Reading, folder: Path) -> str:
 
 
 def plainly(said: str, reading: Reading, folder: Path) -> str:
-    """What a tool says, with places that are the same on every machine."""
+    """A tool's message, with places that are the same on every machine."""
     root = reading.job.root.resolve()
     own = reading.adapter.relative_to(root) if reading.adapter.is_relative_to(root) else reading.adapter
     said = said.replace(str(folder / LINK), str(own)).replace(LINK, str(own))
@@ -193,7 +194,7 @@ def plainly(said: str, reading: Reading, folder: Path) -> str:
 
 
 def _listed(path: Path, folder: Path) -> list[Path]:
-    """What a build read: as make writes it, beside what we generated."""
+    """The files that a build read, from make's list, without the generated ones."""
     try:
         text = read_text(path, "utf-8", errors="replace")
     except OSError:
@@ -204,8 +205,8 @@ def _listed(path: Path, folder: Path) -> list[Path]:
 
 
 def observed(reading: Reading, built: tuple[Built, ...], outside: Outside) -> tuple[Observed, ...]:
-    """What the builds read; the folders in which another file of the same name would have been found first; and what
-    was looked for, where that is traced."""
+    """The files that the builds read; the folders in which another file of the same name would have been found first;
+    and the searched paths, if they are traced."""
     read = dict.fromkeys(path for one in built for path in one.read)
     folders = dict.fromkeys([reading.adapter.parent, *reading.include])
     told = recorded([*(("read", str(p)) for p in read), *(("list", str(p)) for p in folders)])

@@ -1,4 +1,4 @@
-"""Which compiler is here, with libFuzzer or without? Apart from `building`, as every run asks and few build."""
+"""Finds the compiler, with libFuzzer or without. Separate from `building`, as every run needs it and few build."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ extern "C" int LLVMFuzzerTestOneInput(const unsigned char*, std::size_t) { retur
 
 
 def tools() -> tuple[Tool, ...]:
-    """Clang; where it is not here, the compiler of the extra `cpp` first, with which no sanitizer of addresses and no
-    libFuzzer comes."""
+    """Clang; if it is not installed, the compiler of the extra `cpp` first, which has neither the address sanitizer nor
+    libFuzzer."""
     found, wheel = clang(), None if clang().present else zig()
     return (found,) if wheel is None else (wheel, replace(found, optional=True))
 
@@ -40,7 +40,7 @@ def zig() -> Tool | None:
 
 
 def clang() -> Tool:
-    """Missing also where its run-time libraries are: they are packages of their own, and nothing links without them."""
+    """Also missing if its run-time libraries are: they are separate packages, and nothing links without them."""
     found = find_tool("clang++", install="sudo apt install clang", optional=False)
     if not found.present:
         return found

@@ -32,7 +32,7 @@ class Drawn:
     _last: int = 0
 
     def steps(self, ports: Sequence[Port], most: int) -> list[Step]:
-        """The inputs of each step; those that the assumptions seem to rule out are left out where they are run."""
+        """The inputs of each step; those that the assumptions seem to exclude are skipped when they are run."""
         found: list[Step] = []
         before: Step = {}
         for k in range(1 + self.take(1) % most):

@@ -1,4 +1,4 @@
-"""The declared C++ source, read: its adapter header, what is compiled with it, its parameters, its ports."""
+"""The declared C++ source, read: its adapter header, the sources compiled with it, its parameters, its ports."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class Reading:
 
     job: Job
     node: Node
-    """The job's, without the ports that are no machine values and of which no clause speaks."""
+    """The job's node, without the ports that are not machine values and occur in no clause."""
     source: Source
     adapter: Path
     sources: tuple[Path, ...]
@@ -66,7 +66,7 @@ class Reading:
 
 
 def load(job: Job) -> Reading:
-    """Raises Rejected with everything that is wrong with the declaration."""
+    """Raises Rejected with all problems of the declaration."""
     source = job.source
     if source is None or not source.cpp:
         message = f"{job.node.name} has no C++ source: the plan does not say which program it is"
@@ -104,7 +104,7 @@ def load(job: Job) -> Reading:
 
 
 def item_of(sort: Sort) -> Sort:
-    """What an element of a sequence is; of what is none, itself."""
+    """The element sort of a sequence; another sort itself."""
     return sort.item if isinstance(sort, SequenceSort) else sort
 
 
@@ -125,8 +125,8 @@ _INCLUDED = re.compile(rb'^[ \t]*#[ \t]*include(?:_next)?[ \t]*["<]([^">\n]+)[">
 
 
 def files(job: Job) -> tuple[Path, ...]:
-    """The source's files, also where they are not there: what they include from the system's folder with them. What a
-    build read besides is recorded with its answer."""
+    """The source's files, even if missing, with the files that they include from the system's folder. The other files
+    that a build reads are recorded with its answer."""
     source = job.source
     if source is None:
         return ()
@@ -160,7 +160,7 @@ def _included(file: Path, folders: list[Path]) -> Iterator[Path]:
 
 
 def texts(reading: Reading) -> str:
-    """What the source's files say, for the numbers that they write down."""
+    """The texts of the source's files, for the numbers in them."""
     found = []
     for path in files(reading.job):
         try:

@@ -1,6 +1,6 @@
-"""Runs what was built, apart from everything: a script that says through its channel what came of it.
+"""Runs the built programs in isolation: a script that reports the result through its channel.
 
-``python runner.py CHANNEL FILE``: the file's question is a campaign of libFuzzer, or runs for the plain program.
+``python runner.py CHANNEL FILE``: the file's request is a campaign of libFuzzer, or runs for the plain program.
 """
 
 from __future__ import annotations
@@ -37,13 +37,13 @@ _OPTIONS = {
 
 
 _CRASHES = frozenset((signal.SIGSEGV, signal.SIGBUS, signal.SIGFPE, signal.SIGILL, signal.SIGABRT, signal.SIGTRAP))
-"""How a program ends whose own code went wrong."""
+"""The signals that end a program with a fault in its own code."""
 
 
 class _Program(SubjectProcess):
     """A compiled program of the user's in a process of its own. It reads a line ``TURN|COMMAND|COMMAND…`` and answers
-    with one line of JSON that has the same turn: what its own code writes into the channel is no answer. Nothing of it
-    is seen from within: strace reports what it reads.
+    with one line of JSON that has the same turn: anything that its own code writes into the channel is not an answer.
+    It is not observed from within: strace reports what it reads.
 
     Each case is ``{"command": text}``; the text holds neither ``|`` nor the end of a line."""
 
@@ -54,13 +54,13 @@ class _Program(SubjectProcess):
         self._looked: dict[tuple[str, str], None] = {}
 
     def crashed(self) -> str:
-        """The signal that its own code ended with; empty where it ended otherwise."""
+        """The signal with which its own code ended; empty if it ended otherwise."""
         code = self.code or 0
         number = -code if code < 0 else code - 128
         return signal.Signals(number).name if number in _CRASHES else ""
 
     def observed(self) -> tuple[Observed, ...]:
-        """What strace reported of it; without strace nobody knows."""
+        """The reads that strace reported; unknown without strace."""
         for trace in self._traces:
             told = trace.read_all(str(self.path), self.root)
             self._looked.update(dict.fromkeys(told or [("outside", f"what no trace reports of {self.path.name}")]))
@@ -88,7 +88,7 @@ class _Program(SubjectProcess):
 
 @dataclass(frozen=True, slots=True)
 class Campaign:
-    """One run of libFuzzer is wanted."""
+    """A request for one run of libFuzzer."""
 
     folder: str
     kept: str
@@ -97,7 +97,7 @@ class Campaign:
 
 @dataclass(frozen=True, slots=True)
 class Campaigned:
-    """`done`: it ended as it should, with so many runs; nothing that the subject prints says so."""
+    """`done`: it ended normally, after so many runs; this does not depend on the program's output."""
 
     code: int | None
     done: int
@@ -108,8 +108,8 @@ class Campaigned:
 
 @dataclass(frozen=True, slots=True)
 class Runs:
-    """Runs, each of so many commands, are wanted of the program and of its `twin`, if one is named; so many of them may
-    end it."""
+    """A request for runs, each a list of commands, of the program and of its `twin`, if one is named; up to `crashes`
+    of them may end it."""
 
     program: str
     twin: str
@@ -131,14 +131,14 @@ class Answered:
     fault: str
     silent: bool
     unsteady: int | None
-    """The first run that the twin answers otherwise."""
+    """The first run with a different answer from the twin."""
     observed: tuple[Observed, ...]
     isolation: Isolation
 
 
 @dataclass(frozen=True, slots=True)
 class Show:
-    """One run is wanted of the program with sanitizers."""
+    """A request for one run of the program with sanitizers."""
 
     program: str
     commands: tuple[str, ...]
@@ -146,7 +146,7 @@ class Show:
 
 @dataclass(frozen=True, slots=True)
 class Shown:
-    """Its answers as far as they go, and the report with which it ends."""
+    """Its answers up to its end, and the report with which it ends."""
 
     replies: tuple[Any, ...]
     code: int | None
@@ -155,7 +155,7 @@ class Shown:
 
 @dataclass(frozen=True, slots=True)
 class Question:
-    """What the process is asked, in a file; `root` is the system's folder."""
+    """The request to the process, in a file; `root` is the system's folder."""
 
     ask: Campaign | Runs | Show
     root: str
@@ -192,9 +192,9 @@ def _ended(
     told: Mapping[str, str],
     given: int,
 ) -> tuple[int | None, bool, str, str]:
-    """Run a build with sanitizers to its end, and end all that it leaves; `given` is a descriptor that it reads. Its
-    exit code (None: its time was up), whether it left something, what came through the channel, and the end of what it
-    printed as errors."""
+    """Run a build with sanitizers to its end, and end all processes that it leaves; `given` is a descriptor that it
+    reads. Returns its exit code (None: its time was up), whether it left processes, the channel's text, and the end of
+    its error output."""
     with tempfile.TemporaryFile() as errors:
         started = subprocess.Popen(
             command,
@@ -221,9 +221,9 @@ def _ended(
 
 
 def answered(asked: Runs, question: Question) -> Answered:
-    """The runs, each on a node of its own; and once more in the other order, by another process, of a build in which
-    what nothing was written to holds other bytes: what comes of chance, of the clock, of such bytes, or of the runs
-    before is no answer to a run."""
+    """The runs, each on a node of its own; and once more in reverse order, by another process, with a build in which
+    uninitialised memory holds other bytes: an answer that depends on chance, the clock, such bytes, or earlier runs is
+    not accepted."""
     end = time.monotonic() + question.seconds
     first, faults, program = _all(asked.program, asked.runs, asked.crashes, question, end)
     silent = bool(program.silent)

@@ -1,4 +1,4 @@
-"""Settling a node's guarantees of its C++ source: fuzz it, run again what is new, and judge that exactly."""
+"""Tests a node's guarantees on its C++ source: fuzz it, repeat the runs with new coverage, and judge these exactly."""
 
 from __future__ import annotations
 
@@ -91,8 +91,8 @@ def settle(job: Job, limits: Limits) -> Report:
 
 
 class Unanswered(Exception):  # noqa: N818 - it names what happened
-    """The judge gave no answer (`silent`: what it hung on nobody knows), or the subject did what no subject may do: of
-    nothing anything is concluded."""
+    """The judge gave no answer (`silent`: for an unknown reason), or the program did something forbidden: nothing is
+    concluded."""
 
     def __init__(self, verdict: Verdict, why: str, silent: bool = False) -> None:
         super().__init__(why)
@@ -133,7 +133,7 @@ class Work:
                 built[wanted] = building.build(wanted, reading, self.folder, self._outside, self._left())
             asked = built[Build.PLAIN].asked
             unseen = building.looked_into(reading, self.folder, self._outside, asked, self._left())
-        finally:  # also of what cannot be built: it may be once a library is there
+        finally:  # also if the build fails: it may succeed once a library is installed
             self.observed.update(dict.fromkeys(building.observed(reading, tuple(built.values()), self._outside)))
         program = built[Build.PLAIN].program
         bench = Bench(reading)
@@ -164,7 +164,7 @@ class Work:
         counts = Counts(None if campaign is None else campaign.done, len(runs), judged, self.limits.seed)
         return tuple(_doubted(o, unseen) for o in bench.outcomes(counts, fault, bool(faults), tuple(apart)))
 
-    # -- the steps of it ---------------------------------------------------------------------------------
+    # -- steps -------------------------------------------------------------------------------------------
 
     def _left(self) -> float:
         return max(1.0, self._end - time.monotonic())
@@ -202,7 +202,7 @@ class Work:
     def _campaign(self, kept: Path) -> Campaigned:
         options = (
             f"-runs={self.reading.runs}",
-            f"-seed={self.limits.seed + 1}",  # 0 is chance
+            f"-seed={self.limits.seed + 1}",  # 0 means a random seed
             f"-max_len={LONGEST_RUN}",
             f"-timeout={HANGS}",
             f"-rss_limit_mb={RESIDENT}",
@@ -237,7 +237,7 @@ class Work:
         return answer
 
     def _earlier(self) -> Iterator[list[Step]]:
-        """What refuted a guarantee once, as far as it fits the node as it is now."""
+        """The runs that refuted a guarantee earlier, if they fit the node as it is now."""
         names = {port.name for port in self.reading.asked}
         for cases in self.job.kept.values():
             for case in cases:
@@ -250,7 +250,7 @@ class Work:
                     yield run
 
     def _confirm(self, bench: Bench, program: Path) -> None:
-        """Each run that breaks something, cut down, and broken once more by a process that was asked nothing else."""
+        """Reduce each run that violates a guarantee, and repeat the violation in a process with no other requests."""
         for name, broken in list(bench.broken.items()):
             best: Broken | None = None
             tries = [broken.run[-1:], broken.run]
@@ -268,8 +268,8 @@ class Work:
             bench.broken[name] = best
 
     def _fault(self, runs: list[list[Step]]) -> Broken | None:
-        """The first run that libFuzzer stopped at and that the program with sanitizers stops at too, within what the
-        assumptions allow."""
+        """The first run at which libFuzzer stopped and the program with sanitizers stops too, if the assumptions allow
+        it."""
         if not runs:
             return None
         built = building.build(Build.SANITIZED, self.reading, self.folder, self._outside, self._left())
@@ -282,7 +282,7 @@ class Work:
         return None
 
     def _said(self, log: str) -> str:
-        """What a sanitizer reports, with a place that is the same on every machine."""
+        """A sanitizer's report, with a place that is the same on every machine."""
         text = building.plainly(log, self.reading, self.folder)
         plainly = re.search(r"^(\S+:\d+:\d+): (runtime error: .+)$", text, re.MULTILINE)
         if plainly:
@@ -297,21 +297,21 @@ class Work:
         return "the program ends by a signal or an exception"
 
     def _special(self, bench: Bench, program: Path) -> list[tuple[list[Step], str, str, Run]]:
-        """Each REAL input in its turn NaN and infinite, beside a few steps' others; with what came of it."""
+        """Each REAL input in turn NaN and infinite, with a few steps' other inputs; with the replies."""
         asked = bench.special()
         replies = self._asked(program, [run for run, _, _ in asked]).runs if asked else ()
         return [(run, name, word, reply) for (run, name, word), reply in zip(asked, replies, strict=False)]
 
 
 def _doubted(outcome: Outcome, unseen: Unseen) -> Outcome:
-    """A good answer, where what no run shows does not keep it from being given."""
+    """The outcome, unknown instead of good if unobservable behaviour forbids a good one."""
     faultless = outcome.obligation.endswith(f"/{ProgramClaim.FAULTLESS}")
     why = unseen.undeclared or (unseen.faults if faultless else "")
     return replace(outcome, verdict=Verdict.UNKNOWN, summary=why) if why and outcome.verdict.supports else outcome
 
 
 def _files(folder: Path, prefix: str, most: int) -> list[bytes]:
-    """What stands in plain files of a folder in which a subject could write; the shortest first."""
+    """The contents of plain files of a folder in which the program could write; the shortest first."""
     found: list[bytes] = []
     names = sorted(entry.name for entry in os.scandir(folder) if entry.is_file(follow_symlinks=False))
     for name in names:

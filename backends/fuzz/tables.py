@@ -26,12 +26,12 @@ ENDS = (
     2**63 - 1,
     -(2**63),
 )
-"""The ends of machine integers, of ROS' own among them."""
+"""The limits of machine integers, including those of ROS."""
 
 
 @dataclass(frozen=True, slots=True)
 class Drawable:
-    """What inputs are drawn from: positions in these are what a run's bytes mean."""
+    """The values from which inputs are drawn: a run's bytes are indices into these."""
 
     reals: tuple[float, ...]
     integers: tuple[int, ...]
@@ -45,7 +45,7 @@ def native() -> Mapping[str, str]:
 
 
 def drawable(reading: Reading) -> Drawable:
-    """Numbers at which something may change: those of contract, parameters and source."""
+    """Numbers at which behaviour may change: those of contract, parameters and source."""
     node, job = reading.node, reading.job
     formulas = [c.formula for c in (*node.assumptions, *(job.clause(o) for o in job.obligations))]
     seen: dict[Fraction, None] = dict.fromkeys(sorted(numbers_of(formulas), key=lambda n: (abs(n), n)))
@@ -120,7 +120,7 @@ def _port(port: Port, k: int, reading: Reading) -> str:
 
 
 def sort_name(sort: s.Sort) -> str:
-    if isinstance(sort, s.NotScalar):  # refused when the source is read
+    if isinstance(sort, s.NotScalar):  # rejected when the source is read
         raise TypeError(f"{sort} is no machine value")
     match sort:
         case s.BoolSort():
@@ -150,12 +150,12 @@ def _parameters(data: Any, where: str) -> Iterator[str]:
             yield f"{{{_text(where)}, Sort::real, {_real(data)}, 0, {_text('')}}}"
         case str():
             yield f"{{{_text(where)}, Sort::element, 0.0, 0, {_text(data)}}}"
-        case _:  # nothing is given for what is null
+        case _:  # a null has no value
             return
 
 
 def _text(value: str) -> str:
-    """A text as a literal that no text can end."""
+    """A text as a literal that the text cannot end early."""
     return '"' + "".join(chr(b) if chr(b).isalnum() and b < 128 else f"\\{b:03o}" for b in value.encode()) + '"'
 
 
@@ -171,7 +171,7 @@ _LITERAL = re.compile(r"(?<![\w.])(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
 
 
 def _literals(text: str) -> set[Fraction]:
-    """The numbers that a C++ text writes down."""
+    """The numbers in a C++ text."""
     found = set[Fraction]()
     for word in _LITERAL.findall(text):
         number = Fraction(word) if len(word) < 40 and "e" not in word.lower() else Fraction(0)
@@ -213,8 +213,8 @@ class _Part:
 
 @dataclass(slots=True)
 class _Guide:
-    """Formulas as trees in an array, for the harness to look at in machine numbers: what it cannot say is unknown, and
-    nothing is judged by it. `inputs` and `outputs`: name → place among the ports."""
+    """Formulas as trees in an array, which the harness evaluates in machine numbers: inexpressible parts are unknown,
+    and no verdict depends on it. `inputs` and `outputs`: name → index among the ports."""
 
     inputs: Mapping[str, int]
     outputs: Mapping[str, int]
@@ -222,7 +222,7 @@ class _Guide:
     _bound: list[t.Variable] = field(default_factory=list)
 
     def root(self, term: t.Term) -> int:
-        """The place of a formula's tree."""
+        """The index of a formula's tree."""
         try:
             return self._of(term)
         except RecursionError:
@@ -260,7 +260,7 @@ class _Guide:
                 return self._of(same)
             case t.Quantified(quantifier=quantifier, variables=variables, body=body):
                 return self._quantified(quantifier, variables, body)
-            case _:  # what the harness does not look at
+            case _:  # a part that the harness does not evaluate
                 return self._put(_Part("unknown"))
 
     def _number(self, value: Fraction) -> int:

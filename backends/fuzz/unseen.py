@@ -1,7 +1,7 @@
-"""What no run of a source shows: where sanitizers do not look, and what it uses that no record can hold.
+"""Behaviour of a source that no run shows: places that sanitizers do not check, and inputs that cannot be recorded.
 
 Both are read from the source as the compiler sees it: its preprocessed text, and the functions that its object files
-name. A sentence of this module never refutes; it keeps a good answer from being given.
+name. A finding of this module never refutes; it only prevents a good answer.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ UNDECLARED = {
     "_ZNSt6thread20hardware_concurrencyEv": _MACHINE,
     **dict.fromkeys(("syscall", "dlopen", "dlsym"), _HIDDEN),
 }
-"""A function → what comes in by it that is recorded nowhere."""
+"""A function → the unrecorded input that it gives."""
 
 CATCHING = ("signal", "sigaction", "sysv_signal", "__sysv_signal", "bsd_signal", "sigset", "sigvec")
 """Functions after which a fault no longer ends the program."""
@@ -51,7 +51,7 @@ _MARKER = re.compile(r'# (\d+) "((?:\\.|[^"\\])*)"([ \d]*)$')
 
 @dataclass(frozen=True, slots=True)
 class Unseen:
-    """Why nothing good is said of any obligation; why nothing good is said of running without fault. Empty: it is."""
+    """Why no obligation can have a good answer; why the absence of faults cannot. Empty: it can."""
 
     undeclared: str = ""
     faults: str = ""
@@ -71,7 +71,7 @@ class Line:
 
 
 def own(preprocessed: str, generated: Path, adapter: Path) -> Iterator[Line]:
-    """The lines that stand in no system's file and in none that was generated."""
+    """The lines that are in no system's file and in no generated one."""
     file, number, ours = "", 0, False
     for text in preprocessed.splitlines():
         marker = _MARKER.match(text)
@@ -87,12 +87,11 @@ def own(preprocessed: str, generated: Path, adapter: Path) -> Iterator[Line]:
 
 
 def undefined(data: bytes) -> Iterator[str]:
-    """The names that an object file (ELF of 64 bits, little-endian) leaves to others to define. Raises ValueError for
-    another format."""
+    """The undefined names of an object file (64-bit ELF, little-endian). Raises ValueError for another format."""
     if data[:6] != b"\x7fELF\x02\x01":
         raise ValueError("an object file is no ELF of 64 bits")
     start, size, count = (struct.unpack_from(form, data, at)[0] for form, at in (("<Q", 40), ("<H", 58), ("<H", 60)))
-    # kind, offset, size and link of each section; the first one's size is their number where the header has no room
+    # kind, offset, size and link of each section; the first one's size is their number if the header has no room
     sections = [struct.unpack_from("<4xI16xQQI", data, start)]
     sections += (struct.unpack_from("<4xI16xQQI", data, start + k * size) for k in range(1, count or sections[0][2]))
     for kind, offset, length, link in sections:
@@ -104,7 +103,7 @@ def undefined(data: bytes) -> Iterator[str]:
 
 
 def unseen(plain: list[Line], fuzzed: list[Line], asked: Iterable[str]) -> Unseen:
-    """Of a source as the plain build and the sanitizers' build see it, and of the names that its objects ask for."""
+    """The findings for a source as the plain and the sanitizers' build see it, and for its objects' undefined names."""
     undeclared = faults = ""
     for line in plain:
         bare = _TEXT.sub('"x"', line.text)

@@ -1,4 +1,4 @@
-"""What the plain program answered, judged exactly; and what that says of each obligation."""
+"""Judges the plain program's answers exactly, and makes the outcome of each obligation."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class Misused(Exception):  # noqa: N818 - it names what happened
 
 @dataclass(frozen=True, slots=True)
 class Counts:
-    """What was done: libFuzzer's runs (None where it is not here), runs to be judged, runs judged, the seed."""
+    """The counts: libFuzzer's runs (None if it is not installed), runs to be judged, runs judged, the seed."""
 
     fuzzed: int | None
     kept: int
@@ -44,7 +44,7 @@ class Counts:
 
 @dataclass(frozen=True, slots=True)
 class Broken:
-    """A run whose last step breaks something: its inputs, its steps in the contract's words, and why."""
+    """A run whose last step is a violation: its inputs, its steps in the contract's words, and why."""
 
     run: list[Step]
     trace: tuple[Seen, ...]
@@ -57,7 +57,7 @@ class Broken:
 
 @dataclass(slots=True)
 class Guarded:
-    """A guarantee, and how often what makes it say something was met."""
+    """A guarantee, and how often its triggers were met."""
 
     formula: Formula
     triggers: tuple[Formula, ...]
@@ -72,22 +72,22 @@ class Bench:
     reading: Reading
     assumed: tuple[Formula, ...] = field(init=False)
     begins: tuple[Formula, ...] = field(init=False)
-    """What memory has to meet before the first step."""
+    """The conditions on memory before the first step."""
     guarded: dict[str, Guarded] = field(init=False)
     broken: dict[str, Broken] = field(default_factory=dict)
-    """Guarantee → the first run that breaks it."""
+    """Guarantee → the first run that violates it."""
     crash: Broken | None = None
     """The first run in which the program ended by a signal or an exception."""
     begun: Counterexample | None = None
-    """What the constructor makes of memory, where that is not allowed."""
+    """The memory after construction, if it is not allowed."""
     steps: int = 0
     undecided: int = 0
     samples: list[list[Step]] = field(default_factory=list)
     compared: list[Mapping[str, Value]] = field(default_factory=list)
-    """What the program made of allowed steps."""
+    """The program's allowed steps with their results."""
     recorded: Recorded = field(default_factory=Recorded)
     kept: int = 0
-    """How many of those compared were recorded."""
+    """The number of `compared` steps that were recorded."""
 
     def __post_init__(self) -> None:
         job = self.reading.job
@@ -105,7 +105,7 @@ class Bench:
     # -- judging -----------------------------------------------------------------------------------------
 
     def judge(self, run: list[Step], reply: Run) -> None:
-        """Count a run's steps, and keep what it breaks."""
+        """Count a run's steps, and keep its violations."""
         if run and len(self.samples) < APART:
             self.samples.append(run)
         for at, step in self._steps(run, reply):
@@ -128,14 +128,14 @@ class Bench:
                     )
 
     def again(self, name: str, run: list[Step], replies: Sequence[Run]) -> Broken | None:
-        """What a run breaks of a guarantee, asked anew; None where it breaks nothing."""
+        """A repeated run's violation of a guarantee; None if there is none."""
         other = Bench(self.reading)
         for reply in replies:
             other.judge(run, reply)
         return other.broken.get(name)
 
     def _steps(self, run: list[Step], reply: Run) -> Iterator[tuple[int, tuple[Seen, ...]]]:
-        """The steps that the assumptions allow, each with those before it, up to the first that they do not."""
+        """The steps that the assumptions allow, each with those before it, up to the first that they forbid."""
         node, memory = self.reading.node, dict.fromkeys(self.reading.memory, "")
         answers = reply.replies
         trace: tuple[Seen, ...] = ()
@@ -180,8 +180,8 @@ class Bench:
             held = self._held(answer, "memory")
 
     def stopped(self, run: list[Step], answers: Sequence[Mapping[str, Any]]) -> Broken | None:
-        """The step at which a program stopped that answered so far; None where the assumptions do not allow it, or no
-        step was under way."""
+        """The step at which a program with these answers stopped; None if the assumptions do not allow it, or no step
+        was in progress."""
         for _ in self._steps(run, Run(tuple(answers), "a fault")):
             pass
         return self.crash if self.begun is None else None
@@ -196,7 +196,7 @@ class Bench:
         return {name: plain(value) for name, value in data.items()}
 
     def _fits(self, answer: Mapping[str, Any]) -> None:
-        """Raises Misused where the outputs are not the contract's: no fault of the node."""
+        """Raises Misused if the outputs are not the contract's: not a fault of the node."""
         names = {p.name for p in self.reading.node.outputs} - self.reading.memory
         given = {name for name, _ in answer["value"]["d"]}
         if given != names:
@@ -231,10 +231,10 @@ class Bench:
             unknown = unknown or holds is None
         return None if unknown else True
 
-    # -- runs that are no chance -------------------------------------------------------------------------
+    # -- runs that are not random ------------------------------------------------------------------------
 
     def sweep(self, made: Drawable, most: int) -> list[list[Step]]:
-        """Each threshold, and the numbers beside it, in its turn for each input, all else simple."""
+        """Each threshold, and its neighbours, in turn for each input, with simple values for the others."""
         ports = self.reading.asked
         simple: Step = {p.name: _simple(p.sort) for p in ports}
         streams = [[(p.name, value) for value in _values(p.sort, made, self.reading.single)] for p in ports]
@@ -248,7 +248,7 @@ class Bench:
         return found[:most]
 
     def special(self) -> list[tuple[list[Step], str, str]]:
-        """Runs of one step in which one REAL is none: the run, the input, the word for its value."""
+        """Runs of one step in which one REAL is not a number: the run, the input, the word for its value."""
         found = []
         for run in self.samples:
             for port, word in itertools.product(self.reading.asked, SPECIAL):
@@ -260,8 +260,8 @@ class Bench:
         return found
 
     def apart(self, asked: Sequence[tuple[list[Step], str, str, Run]]) -> list[Counterexample]:
-        """What went wrong with inputs that are no REAL: no output, or one that is none, or a guarantee that does not
-        hold as IEEE 754 compares."""
+        """The failures with inputs that are not REAL: a missing or invalid output, or a guarantee that does not hold by
+        IEEE 754 comparison."""
         node, memory = self.reading.node, dict.fromkeys(self.reading.memory, "")
         found: dict[str, Counterexample] = {}
         for run, name, word, reply in asked:
@@ -380,7 +380,7 @@ class Bench:
 
 
 def _of(data: Any, sort: s.Sort | None) -> bool:
-    """Whether the adapter gave a value by the function of its type; memory that is no output has none."""
+    """Whether the adapter gave a value by the function of its type; memory that is not an output has no type."""
     match sort, data:
         case None, _:
             return True
@@ -405,7 +405,7 @@ def _single(data: Any) -> bool:
         case {"f": str(text)}:
             value = float.fromhex(text)
             return not math.isfinite(value) or as_single(value) == value
-        case _:  # no REAL
+        case _:  # not a REAL
             return True
 
 
@@ -428,7 +428,7 @@ def _values(sort: s.Sort, made: Drawable, single: bool) -> list[Any]:
         case s.SequenceSort(item=item):
             one = _values(item, made, single)
             return [[_simple(item)] * n for n in made.lengths] + [row for v in one for row in ([v], [_simple(item), v])]
-        case _:  # a whole number: the source is refused when it is read where a port is of any other sort
+        case _:  # a whole number: `reading` rejects a source with a port of any other sort
             return [n for n in made.integers if n >= 0 or not isinstance(sort, s.NaturalSort)]
 
 
