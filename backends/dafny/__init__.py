@@ -1,7 +1,7 @@
 """A Dafny implementation of the node, verified against the contract (see `docs/backends/dafny.md`).
 
 `modules` writes the specification, `scanner` finds what a person's file leaves unproved, `runner` runs Dafny, and
-`judge` makes verdicts of what it said.
+`judge` derives verdicts from its answers.
 """
 
 from .backend import DafnyBackend

@@ -1,6 +1,6 @@
-"""``python -m avow.backends.dafny FOLDER NODE``: a skeleton of the implementation, where the plan wants it.
+"""``python -m avow.backends.dafny FOLDER NODE``: a skeleton of the implementation, at the path in the plan.
 
-The skeleton includes the specification from where `doit export` writes it, so that an editor opens both.
+The skeleton includes the specification from the folder where `doit export` writes it, so that an editor opens both.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from .printer import NotExpressible
 
 
 def _write_skeleton(folder: Path, node: str, *, method: str | None = None) -> Path:
-    """Write the skeleton to the method's `implementation`, and say where. Raises Rejected, also where a file is."""
+    """Write the skeleton to the method's `implementation`; its path. Raises Rejected, also if the file exists."""
     hint = "add one: dafny: {implementation: models/….dfy}"
     job = job_for(folder, node, "dafny", method, wrong="DFY101", hint=hint)
     name, place = job.options.get("implementation"), job.method.options.at("implementation")
@@ -41,13 +41,13 @@ def _write_skeleton(folder: Path, node: str, *, method: str | None = None) -> Pa
 
 
 def _generated_beside(job: Job, path: Path) -> str:
-    """Where `doit export` writes the files that the skeleton includes, relative to the skeleton's folder."""
+    """The folder of `doit export`'s files that the skeleton includes, relative to the skeleton's folder."""
     place = Workspace(job.root.resolve().parents[1]).node(job.system.name, job.node.name, job.method.id)
     return Path(os.path.relpath(place, path.resolve().parent)).as_posix() + "/"
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """0: written; 2: refused, with the reasons."""
+    """0: written; 2: rejected, with the reasons."""
     parser = argparse.ArgumentParser(
         prog="python -m avow.backends.dafny", description="Write a skeleton where the plan wants the implementation."
     )

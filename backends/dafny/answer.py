@@ -1,4 +1,4 @@
-"""Dafny's answer, read from its XML; exit code and last line are not believed, only held against it.
+"""Dafny's answer, read from its XML; exit code and last line are not trusted, only compared with it.
 
 ``errors`` means not proved, never refuted; ``errors`` without an error inside is a failure of the prover.
 """
@@ -30,12 +30,12 @@ class Failure:
 
 @dataclass(frozen=True, slots=True)
 class Member:
-    """One thing that Dafny verified, or did not: kind ``Impl``, ``CheckWellformed``…"""
+    """One member that Dafny verified, or did not: kind ``Impl``, ``CheckWellformed``…"""
 
     kind: str
     module: str
     scope: str
-    """The class within the module; ``_default`` for what stands in the module itself."""
+    """The class within the module; ``_default`` for members of the module itself."""
     name: str
     outcome: str
     failures: tuple[Failure, ...]
@@ -51,7 +51,7 @@ class Complaint:
 
 
 def read_members(xml: str) -> tuple[Member, ...] | None:
-    """None where it is not the XML of a finished run."""
+    """None if it is not the XML of a finished run."""
     text = xml.lstrip("\ufeff")
     if "<!DOCTYPE" in text or "<!ENTITY" in text:
         return None
@@ -65,18 +65,18 @@ def read_members(xml: str) -> tuple[Member, ...] | None:
 
 
 def complaints(output: str) -> tuple[Complaint, ...]:
-    """Every error that Dafny prints with a place, and every warning of a body that is missing."""
+    """Every error that Dafny prints with a place, and every warning of a missing body."""
     return tuple(Complaint(_file(m["file"]), int(m["line"]), m["what"].strip()) for m in _SAID.finditer(output))
 
 
 def counted(output: str) -> int | None:
-    """How many errors Dafny says that it has found while reading."""
+    """The number of errors that Dafny reports from parsing and resolution."""
     match = _COUNT.search(output)
     return int(match.group(1)) if match else None
 
 
 def quiet(output: str) -> str:
-    """Without the list of legal parameters that newer Z3s print at each question of an older Dafny."""
+    """The output without the list of legal parameters that newer Z3s print at each query of an older Dafny."""
     return "\n".join(line for line in output.splitlines() if not _NOISE.match(line)) + "\n"
 
 
@@ -97,7 +97,7 @@ def _failure(error: ElementTree.Element) -> Failure:
 
 
 def _file(name: str) -> str:
-    """Without the module by which a refinement inherits the place: ``lamp_spec.dfy[LampImpl]``."""
+    """The name without the module by which a refinement inherits the place: ``lamp_spec.dfy[LampImpl]``."""
     return re.sub(r"\[\w+\]$", "", name.strip())
 
 

@@ -1,6 +1,6 @@
 """The Dafny backend: the contract as a specification that a hand-written implementation refines, verified by Dafny.
 
-Imports stay light: whoever lists the backends does not load what writes and reads Dafny.
+Imports stay light: listing the backends does not load the code that writes and reads Dafny.
 """
 
 from __future__ import annotations
@@ -71,7 +71,7 @@ class DafnyBackend(Backend):
         try:
             generated = _generate(job)
         except NotExpressible as problem:
-            # The contract is in order; it is this backend that cannot treat it. The outcome says so, too.
+            # The contract is valid, but this backend cannot handle it. The outcome reports this, too.
             message = f"node '{job.node.name}' cannot be put into Dafny: {problem.what}"
             return (Diagnostic("DFY104", message, problem.span or job.node.span, Severity.WARNING),)
         scanned = _scan(text, generated)
@@ -107,7 +107,7 @@ class DafnyBackend(Backend):
         yield OutsideCheck(path, ("dafny", *words, path), tuple(name for _, name in covered))
 
     def translate(self, notation: str, system: System, node: Node) -> Translated:
-        """What `export` has, for all the node's guarantees, and a skeleton beside it."""
+        """The files of `export`, for all the node's guarantees, and a skeleton beside them."""
         from .modules import generate
         from .printer import NotExpressible
 
@@ -193,7 +193,7 @@ def _implementation(job: Job) -> tuple[Path, str]:
 
 
 def _shown(folder: Path) -> str:
-    """The folder as one would type it here."""
+    """The folder as one would type it in the current directory."""
     try:
         return shlex.quote(str(folder.resolve().relative_to(Path.cwd())) or ".")
     except (OSError, ValueError):

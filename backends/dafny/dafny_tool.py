@@ -1,4 +1,4 @@
-"""Is Dafny here, and in which version? Apart from `runner`, as every run asks and few run it."""
+"""Whether Dafny is installed, and its version. Separate from `runner`, as every run needs it and few run Dafny."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ _MONO = ("/usr/lib/mono", "/etc/mono")
 
 
 def dafny() -> Tool:
-    """Dafny as found now. Never raises."""
-    # Any run prints its version in the XML only; without a file it says it in a usage line.
+    """The installed Dafny. Never raises."""
+    # A normal run prints the version only in the XML; without a file it is in a usage line.
     found = find_tool("dafny", ("/version",), install=INSTALL, pattern=_VERSION, optional=False)
     if found.version == "unknown":
         found = find_tool("dafny", ("--version",), install=INSTALL, pattern=_VERSION, optional=False)
-    # Its prover; what runs it, from version 4 on, and before.
+    # Its prover; its runtime, from version 4 on, and before.
     parts = (shutil.which("z3"), shutil.which("dotnet"), *(place for place in _MONO if os.path.isdir(place)))  # noqa: PTH112
     return replace(found, parts=tuple(part for part in parts if part is not None), trial=_trial)
 
 
 def has_commands(version: str | None) -> bool:
-    """Whether this version is asked by commands. One that does not tell its version is asked as 2.3 is."""
+    """Whether this version is called with commands. One that does not report its version is called like 2.3."""
     major = re.match(r"\d+", version or "")
     return major is not None and int(major[0]) >= 4
 

@@ -1,8 +1,8 @@
-"""What a contract remembers, in Dafny: a datatype `History`, what it is first, and how a step moves it on.
+"""A contract's state variables in Dafny: a datatype `History`, its initial value, and how a step updates it.
 
-The history is ghost: a step is given it, and may speak of it in its proof only. What the program keeps is of a type of
-the implementer's, `Memory`, and an invariant of his, `Linked`, says what it has to do with the history: `Established`
-shows that it holds first, and Step that it keeps it.
+The history is ghost: a step gets it, and may use it only in its proof. The program's state has a type of the
+implementer's, `Memory`, and an invariant of the implementer's, `Linked`, relates it to the history: `Established` shows
+that it holds initially, and Step that it is preserved.
 """
 
 from __future__ import annotations
@@ -22,22 +22,22 @@ ESTABLISHED, FIRST = "Established", "First"
 
 @dataclass(frozen=True, slots=True)
 class History:
-    """The history of a node, as the generated modules have it. Without cells there is none, and nothing is said."""
+    """The history of a node, as in the generated modules. Without cells there is none, and no lines for it."""
 
     cells: tuple[Variable, ...] = ()
     begins: tuple[Predicate, ...] = ()
     moves: tuple[tuple[Predicate, ...], ...] = ()
-    """For each cell what a step leaves, the last of its predicates, after those of its quantifiers."""
+    """For each cell its value after a step: the last of its predicates, after those of its quantifiers."""
     ports: tuple[Variable, ...] = ()
     told: tuple[str, ...] = ()
-    """Comments: what each cell is kept for."""
+    """Comments: the purpose of each cell."""
 
     def call(self, predicate: Predicate, words: Vocabulary) -> str:
         """A predicate of the contract, of the history `h`."""
         return self._of(predicate, words, "Contract.")
 
     def given(self, signature: str, *, program: bool = True) -> str:
-        """The parameters of what is given the history, and what the program keeps."""
+        """The parameters of a declaration that gets the history, and the program's state."""
         before = ["ghost h: Contract.History", "m: Memory"] if program else ["h: Contract.History"]
         return ", ".join((*(before if self.cells else ()), *((signature,) if signature else ())))
 
@@ -132,7 +132,7 @@ def history(steps: Stepping, words: Vocabulary) -> History:
 
 
 def _named(wanted: str, words: Vocabulary) -> str:
-    """A name that no clause of the contract has; its identifier looks as wanted."""
+    """A name that no clause of the contract has, with the wanted identifier."""
     name = f"{wanted} {CELL}"
     words.names("clause", name, wanted)
     return name

@@ -1,11 +1,12 @@
 """From Dafny's answers to a verdict for each guarantee.
 
-Proved only if all of this holds: the file refines the generated specification and takes nothing for granted (our scan
-and Dafny's own complaints agree); every method and lemma that it declares, and Step and EnvNotEmpty among them, is in
-the answer; everything in the answer is correct; and the printed count of errors is 0. Anything less is not a proof.
+Proved only if all of this holds: the file refines the generated specification and assumes nothing without proof (our
+scan and Dafny's own complaints agree); every method and lemma that it declares, and Step and EnvNotEmpty among them, is
+in the answer; everything in the answer is correct; and the printed count of errors is 0. Anything less is not a proof.
 
-What Env asks for is read from the program that Dafny prints once it has resolved all names, in the implementation's
-module; that an Env that reads `true` asks nothing is proved besides, of the name that a module of Avow's own resolves.
+The condition Env is read from the program that Dafny prints once it has resolved all names, in the implementation's
+module; that an Env that reads `true` excludes nothing is also proved, for the name as a module of Avow's own resolves
+it.
 """
 
 from __future__ import annotations
@@ -60,7 +61,7 @@ class Judgement:
 def settle(
     node: Node, generated: Generated, scanned: Scan, shown_name: str, limits: Limits, outside: Outside
 ) -> Judgement:
-    """Run Dafny and judge each guarantee of the node. `shown_name` is what the implementation is called in messages.
+    """Run Dafny and judge each guarantee of the node. `shown_name` is the implementation's name in messages.
 
     Raises ToolMissing, OSError.
     """
@@ -91,7 +92,7 @@ def settle(
     unproved = dict.fromkeys(guarantees, _unproved(run))
     spared = _spared(run, generated)
     if spared:
-        # Only other guarantees failed. Dafny assumes what it has reported before it goes on, so these are asked
+        # Only other guarantees failed. Dafny assumes a reported condition before it continues, so these are run
         # again without those.
         again = verify(_files(generated, scanned, spared, asks), limits, outside)
         logs["verify-again.log"] = again.output
@@ -123,7 +124,7 @@ def _verdict(
     if unproved:
         details["not proved"] = list(unproved)
         if tried:
-            details["candidates"] = tried  # what the prover could not rule out; nobody ran the implementation there
+            details["candidates"] = tried  # not excluded by the prover; the implementation was not run on them
         where = ", ".join(f"{name} = {value}" for name, value in tried[0].items()) if tried else ""
         doubt = f"; the prover could not rule it out at {where}" if where else ""
         return Settled(Verdict.UNKNOWN, f"not proved: {_few(unproved)}{doubt}", taken, details)
@@ -139,7 +140,7 @@ def _verdict(
     if environment != "true":
         added = (f"added assumption of the implementation, Env: {environment}",)
         summary += " and Env"
-    details[OUTPUT_FOR_EVERY_INPUT] = True  # what Env leaves out is a hypothesis
+    details[OUTPUT_FOR_EVERY_INPUT] = True  # the inputs that Env excludes are a hypothesis
     return Settled(Verdict.PROVED, summary, added, details)
 
 
@@ -164,11 +165,11 @@ def _broken(run: Run, scanned: Scan, generated: Generated, shown_name: str) -> S
 
 
 def _taken_for_granted(audited: Audit, scanned: Scan, generated: Generated, shown_name: str) -> tuple[str, ...] | None:
-    """What the implementation assumes, by our scan and by Dafny's own account; None where Dafny gave none."""
+    """The implementation's assumptions, by our scan and by Dafny's own report; None without such a report."""
     if audited.complaints is None:
         return None
     found = [f"{shown_name}:{line}: {what}" for line, what in scanned.hypotheses]
-    # The generated types leave the partial operations open on purpose (see `modules`); nothing else may be open.
+    # The generated types leave the partial operations undefined on purpose (see `modules`); nothing else may be.
     found += [
         f"{_name(c.file, generated, shown_name)}:{c.line}: {c.message}"
         for c in audited.complaints
@@ -178,14 +179,14 @@ def _taken_for_granted(audited: Audit, scanned: Scan, generated: Generated, show
 
 
 def _environment(run: Run, scanned: Scan, generated: Generated) -> str | None:
-    """The body of Env: Dafny's own, where this version prints it; else as the file has it in the module itself."""
+    """The body of Env: Dafny's own, if this version prints it; else as in the file, in the module itself."""
     if run.resolved is None:
         return scanned.environment
     return resolved_environment(run.resolved, generated.impl_module)
 
 
 def _lacking(members: tuple[Member, ...], scanned: Scan, generated: Generated, environment: str | None) -> list[str]:
-    """Members that should be in the answer and are not: Dafny is silent of a method without a body."""
+    """Members that are missing from the answer: Dafny does not report a method without a body."""
     there = {(m.module, m.name) for m in members if (m.kind, m.scope) == ("Impl", "_default")}
     names = {m.name for m in members if m.kind == "Impl"}
     found = [what for _, what in scanned.problems]
@@ -201,7 +202,7 @@ def _lacking(members: tuple[Member, ...], scanned: Scan, generated: Generated, e
 
 
 def _unproved(run: Run) -> tuple[str, ...]:
-    """Everything that is not proved, in words; empty only where all is."""
+    """Everything that is not proved, in words; empty only if all is proved."""
     found = []
     for member in run.members or ():
         if member.outcome == "correct" and not member.failures:
@@ -245,8 +246,8 @@ def _only(text: str, ensures: Sequence[tuple[int, str]], guarantees: tuple[str, 
 
 
 def _files(generated: Generated, scanned: Scan, guarantees: tuple[str, ...], asks: bool) -> dict[str, str]:
-    """What Dafny is given. `asks`: whether Env, as the file has it, asks for something. A file that cannot be an
-    implementation is not called from outside: then Dafny's complaints are about the file alone."""
+    """Dafny's input files. `asks`: whether Env, as in the file, excludes anything. A file that cannot be an
+    implementation is not called from outside: then Dafny's complaints are only about the file."""
     probe = _only(generated.probe, generated.probe_ensures, guarantees)
     files = {
         generated.types_file: generated.types,
@@ -258,14 +259,14 @@ def _files(generated: Generated, scanned: Scan, guarantees: tuple[str, ...], ask
 
 
 def _asked_of_env(files: Mapping[str, str], generated: Generated) -> dict[str, str]:
-    """What Dafny is given to tell what Env excludes."""
+    """Dafny's input files to determine what Env excludes."""
     head, end, _ = files[generated.contract_file].rpartition("}")
     whole = f"{head}{generated.situations}\n{end}\n"
     return {**files, generated.contract_file: whole, EXCLUDED_FILE: generated.excluded}
 
 
 def _about_nothing(run: Run, generated: Generated) -> frozenset[str]:
-    """The guarantees of which Dafny proves that Env excludes a condition that the contract alone does not exclude."""
+    """The guarantees for which Dafny proves that Env excludes a condition that the contract alone does not exclude."""
     proved = {m.name for m in run.members or () if m.kind == "Impl" and m.outcome == "correct"}
     asked = enumerate(generated.conditions)
     return frozenset(name for k, name in asked if f"{BY_ENV}{k}" in proved and f"{ANYWAY}{k}" not in proved)
@@ -287,10 +288,10 @@ _LINE = re.compile(r"(?P<name>[\w'?]+)#\d+(?:@@\d+)? -> (?P<value>\(- \d+(?:\.\d
 
 
 def candidates(model: str, node: Node) -> tuple[Mapping[str, str], ...]:
-    """From the prover's model up to three candidates, never counterexamples, as ``{"in.r": "125"}``; none where the
-    node has inputs of other sorts alone. The prover gives up with a model of what it could not rule out, which may be
-    no behaviour at all. Only what it says of inputs of simple sorts is read, and only where the contract's
-    assumptions, replayed in Z3, do not forbid it."""
+    """From the prover's model up to three candidates, never counterexamples, as ``{"in.r": "125"}``; none if the node
+    has only inputs of other sorts. The prover gives up with a model that it could not exclude, which may not be a
+    possible behaviour. Only its values for inputs of simple sorts are read, and only if the contract's assumptions,
+    replayed in Z3, do not forbid them."""
     found: list[Mapping[str, str]] = []
     for text in _models(model):
         values = _values(text, node)
@@ -331,12 +332,12 @@ def _value(text: str, variable: Variable) -> Value | None:
             return number
         case IntegerSort() | NaturalSort() if number.denominator == 1:
             return int(number)
-        case _:  # no number of this sort
+        case _:  # not a number of this sort
             return None
 
 
 def _allowed(node: Node, values: Mapping[Variable, Value]) -> bool:
-    """Whether no assumption about these inputs alone is known to be false of them."""
+    """Whether no assumption about these inputs alone is known to be false for them."""
     from avow.solving.replay import replay  # Z3 is slow to import
 
     spoken = [

@@ -1,8 +1,8 @@
 """Dafny 4 and later: the commands `verify` and `audit`, and how their answers are read.
 
 By its public documentation and output recorded by others (no Dafny 4 was at hand): `verify --log-format csv` writes a
-row for each thing that it verified, ``AgentImpl.Step (correctness),Passed,…``; what failed is printed with its place
-and the related ones; `audit` prints a line for each assumption and then counts them. Anything else is no answer.
+row for each member that it verified, ``AgentImpl.Step (correctness),Passed,…``; failures are printed with their places
+and the related ones; `audit` prints a line for each assumption and then counts them. Anything else is not an answer.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from .answer import Complaint, Failure, Member
 
 LOG = "answer.csv"
 LENIENT = "--allow-warnings"
-"""Without it later versions take a warning for a failure; earlier ones do not know it."""
+"""Without it later versions treat a warning as a failure; earlier ones do not know it."""
 
 _HEAD = "TestResult.DisplayName,TestResult.Outcome,"
 _ROW = re.compile(r"(?P<name>[^,()]+) \((?P<what>[^()]+)\)(?: \(assertion batch \d+\))?,(?P<outcome>\w+),.*")
@@ -39,8 +39,8 @@ def is_unknown_option(output: str) -> bool:
 
 
 def read_log(text: str, output: str) -> tuple[Member, ...] | None:
-    """What was verified, by the log; None where it is none. `output` says where it failed, not in what: the places are
-    put to the one member that failed, where it is the only one."""
+    """The verified members, by the log; None if it is not one. `output` has the places of failures, not the members:
+    the places are assigned to the failed member if there is only one."""
     lines = text.lstrip("\ufeff").splitlines()
     if not lines or not lines[0].startswith(_HEAD):
         return None
@@ -53,7 +53,7 @@ def read_log(text: str, output: str) -> tuple[Member, ...] | None:
             return None
         member = _member(match)
         before = members.get((match["name"], match["what"]))
-        if before is None or before.outcome == "correct":  # of a proof in batches the worst counts
+        if before is None or before.outcome == "correct":  # for a proof in batches the worst counts
             members[match["name"], match["what"]] = member
     failed = [key for key, member in members.items() if member.outcome != "correct"]
     if len(failed) == 1:
@@ -84,7 +84,7 @@ def _failures(output: str) -> tuple[Failure, ...]:
 
 
 def read_audit(output: str) -> tuple[Complaint, ...] | None:
-    """What is taken for granted; None where the auditor did not come to its end, or counts more than it shows."""
+    """The unproved assumptions; None if the auditor did not finish, or counts more than it shows."""
     counts = _COUNTED.findall(output)
     if len(counts) != 1:
         return None

@@ -53,11 +53,12 @@ _FUNCTIONS = {
     "MaxInt": "(a: int, b: int): int { if a < b then b else a }",
     "MaxReal": "(a: real, b: real): real { if a < b then b else a }",
 }
-"""Functions that are generated where a formula uses them: of each operator that is one, for each type it has."""
+"""Functions that are generated if a formula uses them: for each operator that is a function, one for each of its types.
+"""
 
 
 def _complete() -> None:
-    """Raises where the table of operators names a function that would not be generated, or whose name is not kept."""
+    """Raises TypeError if a function in the table of operators is not generated, or its name not reserved."""
     wanted = {
         f"{row.dafny.removeprefix('Types.')}{kind}"
         for row in OPERATORS.values()
@@ -78,7 +79,7 @@ _complete()
 
 @dataclass(frozen=True, slots=True)
 class Generated:
-    """Everything for one node. `ensures` maps a line of the specification to the guarantee that stands there."""
+    """Everything for one node. `ensures` maps a line of the specification to its guarantee."""
 
     node: str
     spec_module: str
@@ -95,28 +96,28 @@ class Generated:
     ensures: tuple[tuple[int, str], ...]
     probe_module: str
     probe: str
-    """A module of Avow's own that calls the implementation from outside, by its qualified name: that its Step gives
-    what the contract wants, and that its Env asks nothing, is then said of what Dafny takes these names for."""
+    """A module of Avow's own that calls the implementation from outside, by its qualified name: the proofs that its
+    Step meets the contract, and that its Env excludes nothing, are then about these names as Dafny resolves them."""
     probe_ensures: tuple[tuple[int, str], ...]
     """The same map for its `ensures`."""
     uncovered: tuple[tuple[str, str], ...]
     """Guarantees that cannot be expressed, with the reason."""
     situations: str = ""
-    """More predicates of the module of the contract: the conditions of guarantees."""
+    """More predicates of the contract's module: the conditions of guarantees."""
     excluded: str = ""
-    """A module that asks of each of them whether Env, or the contract anyway, keeps it from coming about."""
+    """A module that checks for each of them whether Env, or the contract alone, excludes it."""
     conditions: tuple[str, ...] = ()
-    """Of each of them, the guarantee."""
+    """The guarantee of each of them."""
     remembers: bool = False
-    """Whether the contract speaks of other steps, so that there is a history."""
+    """Whether the contract refers to other steps, so that there is a history."""
 
     def skeleton(self, folder: str = "") -> str:
-        """A first implementation. `folder`: where the generated files are, relative to where it will be (``../x/``)."""
+        """A first implementation. `folder`: the folder of the generated files, relative to its own (``../x/``)."""
         return f'include "{folder}{self.spec_file}"\n{self.outline}'
 
     @property
     def lemmas(self) -> tuple[str, ...]:
-        """Those that an implementation has to give."""
+        """The lemmas that an implementation has to provide."""
         return ("EnvNotEmpty", ESTABLISHED) if self.remembers else ("EnvNotEmpty",)
 
 
@@ -140,7 +141,7 @@ def generate(node: Node, guarantees: Sequence[str]) -> Generated:
     title = title[:1].upper() + title[1:]
     spec_module, impl_module = names.fresh(f"{title}Spec"), names.fresh(f"{title}Impl")
     probe_module = names.fresh(f"{title}Probe")
-    for clause in node.clauses:  # clauses first: they keep their names whatever their quantifiers are called
+    for clause in node.clauses:  # clauses first: they keep their names, whatever their quantifiers' names are
         names("clause", clause.name)
     for port in inputs + outputs:
         words.local(port)
@@ -184,7 +185,7 @@ def _excluded(
     words: Vocabulary,
     impl_module: str,
 ) -> tuple[str, str, tuple[str, ...]]:
-    """Predicates for the conditions of guarantees, a module that asks what excludes them, and whose each is."""
+    """Predicates for conditions of guarantees, a module that checks what excludes them, and the guarantee of each."""
     taken = signature([p.variable for p in (*node.inputs, *node.outputs)], words)
     env = f"Implementation.Env({', '.join(words.local(p.variable) for p in node.inputs)})"
     sane = [f"    requires {past.call(p[-1], words)}" for p in assumed]
@@ -208,7 +209,7 @@ def _excluded(
 
 def _types(words: Vocabulary) -> str:
     lines = ["// Generated: the types of the contract. Do not edit.", f"{_MODULE} Types {{"]
-    # Asking for the types of constructors' parameters may bring further types in, so this is no plain loop.
+    # The types of constructors' parameters may add further types, so this is not a plain loop.
     done: set[object] = set()
     body: list[str] = []
     while pending := [sort for sort in words.types if sort not in done]:
@@ -364,7 +365,7 @@ def _probe(
 
 
 def without_env_always(probe: str) -> str:
-    """The probe for an implementation whose Env asks for something."""
+    """The probe for an implementation whose Env excludes something."""
     return probe[: probe.index(f"\n  lemma {ENV_ALWAYS}(")] + "}\n"
 
 

@@ -1,9 +1,9 @@
 """Typed terms as Dafny expressions, and the contract's names as Dafny identifiers.
 
-Every quantifier becomes a call of a named predicate that holds its body: bare nested quantifiers leave Dafny without
-terms to trigger on, and an implementation can name a witness (``assert Contract.exit_ex1(in_map, out_command, x, y)``).
-Partial operations (division by zero, an element beyond a sequence's end) become calls of functions about which nothing
-is known there, so whatever is proved holds however they are read.
+Every quantifier becomes a call of a named predicate that holds its body: bare nested quantifiers give Dafny no terms as
+triggers, and an implementation can name a witness (``assert Contract.exit_ex1(in_map, out_command, x, y)``).
+Partial operations (division by zero, an element beyond a sequence's end) become calls of functions that are unspecified
+there, so that every proof holds for any reading of them.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from avow.language.operators import OPERATORS, Level, Operator, Why
 
 
 class NotExpressible(Exception):  # noqa: N818 - it names what the term is
-    """A construct without a counterpart here; what needs it is reported as not covered."""
+    """A construct without a counterpart here; clauses that need it are reported as not covered."""
 
     def __init__(self, what: str, span: Span | None) -> None:
         super().__init__(what)
@@ -47,17 +47,17 @@ class Predicate:
 
 @dataclass(slots=True)
 class Vocabulary:
-    """The names of one node's export, shared by all that is printed for it."""
+    """The names of one node's export, shared by all its printed parts."""
 
     names: Names
-    """Of types, constructors and predicates."""
+    """The names of types, constructors and predicates."""
     locals: Names
-    """Of ports and bound variables."""
+    """The names of ports and bound variables."""
     ports: tuple[t.Variable, ...]
     types: dict[s.Sort, str] = field(default_factory=dict)
     """Declared sorts that occur, in order of first use."""
     functions: set[str] = field(default_factory=set)
-    """The functions of numbers that are called, without their module."""
+    """The called functions on numbers, without their module."""
 
     def local(self, variable: t.Variable) -> str:
         wanted = None if variable.role == "bound" else f"{variable.role}_{variable.name}"
@@ -110,7 +110,7 @@ def print_clause(name: str, formula: t.Term, words: Vocabulary) -> tuple[Predica
 
 
 def call(predicate: Predicate, words: Vocabulary, module: str = "") -> str:
-    """The predicate applied to variables of the names of its parameters."""
+    """The predicate applied to variables with the names of its parameters."""
     arguments = ", ".join(words.local(p) for p in predicate.parameters)
     return f"{module}{predicate.name}({arguments})"
 
@@ -121,7 +121,7 @@ def signature(variables: Sequence[t.Variable], words: Vocabulary) -> str:
 
 
 _Text = tuple[str, bool]
-"""Text, and whether it can stand as an operand without parentheses."""
+"""Text, and whether it can be an operand without parentheses."""
 
 _KINDS: Mapping[t.Quantifier, str] = {
     t.Quantifier.FORALL: "all",
@@ -191,7 +191,7 @@ class _Printer:
                 return f"{inner} as real", False
             case t.Negative(term=inner_term, sort=sort):
                 inner = yield self.operand(inner_term, scope)
-                # Of a natural, Dafny 2.3 takes `-n` to be one too, and then complains that it may not be.
+                # For a natural, Dafny 2.3 takes `-n` to be one too, and then complains that it may not be.
                 return (f"-{inner}" if sort == s.REAL or isinstance(inner_term, t.Literal) else f"0 - {inner}"), False
             case t.Arithmetic(operator=operator) | t.Operation(operator=operator):
                 whole = yield self.operation(OPERATORS[operator], term, scope)
@@ -210,7 +210,7 @@ class _Printer:
                 inner = yield self.list(items, scope)
                 if items:
                     return f"[{inner}]", True
-                # An empty display alone says nothing of its type.
+                # An empty display alone does not determine its type.
                 return f"(var nothing: {sort_text(sequence_sort, self.words)} := []; nothing)", True
             case t.SequenceRange(low=low, high=high):
                 inner = yield self.list((low, high), scope)
@@ -264,7 +264,7 @@ class _Printer:
         self.words.functions.add(name.removeprefix("Types."))
         if not isinstance(operator.takes, Why) and operator.takes[1] is not None:
             return f"{name}({', '.join(texts)})", True
-        return reduce(lambda a, b: f"{name}({a}, {b})", texts), True  # of any number: two after two
+        return reduce(lambda a, b: f"{name}({a}, {b})", texts), True  # any number of arguments: pairwise
 
     def membership(self, item: t.Term, collection: t.Term, scope: tuple[t.Variable, ...]) -> Steps[_Text]:
         left = yield self.operand(item, scope)
@@ -273,7 +273,7 @@ class _Printer:
             return f"{left} in {right}", False
         if not collection.items:
             return "false", True
-        # A disjunction, not a set display: it needs no equality that can be compiled.
+        # A disjunction, not a set display: it needs no compilable equality.
         parts = []
         for member in collection.items:
             text = yield self.operand(member, scope)
@@ -286,7 +286,7 @@ class _Printer:
         inner_scope = scope + term.variables
         body, _ = yield self.term(term.body, inner_scope)
         outer = self.parameters(term, scope)
-        # Every bound variable is a parameter, used or not: the call is the only term to trigger on.
+        # Every bound variable is a parameter, used or not: the call is the only trigger term.
         predicate = Predicate(name, outer + term.variables, body, self.clause)
         self.made.append(predicate)
         bound = ", ".join(f"{self.words.local(v)}: {sort_text(v.sort, self.words)}" for v in term.variables)
@@ -362,21 +362,21 @@ _BIT_VECTOR = re.compile(r"bv\d+|array\d+")
 @dataclass(slots=True)
 class Names:
     """Hands out identifiers; the same (kind, name) always gets the same one within a table. Text from a contract is
-    data: whatever a name looks like (a keyword, a primed or a Greek name), what comes out is an identifier, unchanged
-    where Dafny allows it, and different names come out different."""
+    data: any name (a keyword, a primed or a Greek name) gives an identifier, unchanged if Dafny allows it, and
+    different names give different identifiers."""
 
     taken: set[str] = field(default_factory=set)
     given: dict[tuple[str, str], str] = field(default_factory=dict)
 
     def __call__(self, kind: str, name: str, wanted: str | None = None) -> str:
-        """The identifier for a name; `wanted` is what it should look like, if not like the name itself."""
+        """The identifier for a name; `wanted` is its preferred form, if not the name itself."""
         key = (kind, name)
         if key not in self.given:
             self.given[key] = self.fresh(name if wanted is None else wanted)
         return self.given[key]
 
     def fresh(self, wanted: str) -> str:
-        """An identifier that nothing else has."""
+        """A unique identifier."""
         base = identifier(wanted)
         candidate, number = base, 2
         while candidate in self.taken or candidate in RESERVED or _BIT_VECTOR.fullmatch(candidate):
@@ -391,7 +391,7 @@ class Names:
 
 
 def identifier(text: str) -> str:
-    """`text`, if it may be an identifier, else something that looks like it."""
+    """`text`, if it may be an identifier, else an identifier similar to it."""
     if _PLAIN.fullmatch(text):
         return text
     safe = "".join(c if c.isascii() and (c.isalnum() or c in "_'") else f"u{ord(c):04x}" for c in text)

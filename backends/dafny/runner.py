@@ -1,6 +1,6 @@
-"""Bounded runs of Dafny: what was verified, and what Dafny itself finds left without a body or assumed.
+"""Bounded runs of Dafny: the verified members, and the missing bodies and assumptions that Dafny itself finds.
 
-Up to version 3 it is asked with the options of 2.3, from version 4 on with its commands (`modern`).
+Up to version 3 it is called with the options of 2.3, from version 4 on with its commands (`modern`).
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ _FINISHED = re.compile(r"Dafny program verifier finished with \d+ verified, \d+ 
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """One run. `members` is None where there is no readable answer."""
+    """One run. `members` is None if there is no readable answer."""
 
     command: tuple[str, ...]
     code: int | None
@@ -39,10 +39,9 @@ class Run:
     counted: int | None
     output: str
     model: str
-    """The prover's models of what it could not prove, as Boogie prints them."""
+    """The prover's models for unproved conditions, as Boogie prints them."""
     resolved: str | None
-    """The program as Dafny has it once names are resolved and refinements made; None where this version has no such
-    option."""
+    """The program after resolution and refinement, as Dafny prints it; None if this version has no such option."""
 
     @property
     def timed_out(self) -> bool:
@@ -51,7 +50,7 @@ class Run:
 
 @dataclass(frozen=True, slots=True)
 class Audit:
-    """What Dafny complains of besides. `complaints` is None where it has not said all."""
+    """Dafny's other complaints. `complaints` is None if the list is incomplete."""
 
     complaints: tuple[Complaint, ...] | None
     output: str
@@ -74,7 +73,7 @@ def verify(files: Mapping[str, str], limits: Limits, outside: Outside) -> Run:
 
 
 def audit(files: Mapping[str, str], limits: Limits, outside: Outside) -> Audit:
-    """Have Dafny say what it takes for granted, without verifying; nothing is compiled or executed. Raises ToolMissing.
+    """Have Dafny list its unproved assumptions, without verifying; nothing is compiled or executed. Raises ToolMissing.
 
     2.3 complains of every missing body and assumption when it translates the files; 4 has a command for it."""
     if has_commands(dafny().version):
@@ -105,12 +104,12 @@ def _run(first: Sequence[str], files: Mapping[str, str], limits: Limits, outside
     megabytes: int | None = limits.megabytes
     env: dict[str, str] = {}
     if has_commands(dafny().version):
-        # .NET reserves far more addresses than it uses: a bound on addresses would keep it from starting at all.
+        # .NET reserves far more addresses than it uses: a limit on addresses would prevent it from starting.
         env, megabytes = {"DOTNET_GCHeapHardLimit": f"{limits.megabytes * 2**20:x}"}, None
         runtime = shutil.which("dotnet")
         if runtime is not None:
             env["DOTNET_ROOT"] = os.path.dirname(os.path.realpath(runtime))  # noqa: PTH120
-    # The files' names are ours (derived by `file_stem`): none can be taken for an option or lead elsewhere.
+    # The files' names are ours (derived by `file_stem`): none can be read as an option or refer to another folder.
     command = ("dafny", *first, *files)
     with tempfile.TemporaryDirectory(prefix="avow-dafny-") as name:
         folder = Path(name)

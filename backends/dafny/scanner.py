@@ -1,8 +1,8 @@
-"""What a hand-written Dafny file leaves unproved without Dafny saying so.
+"""Finds what a hand-written Dafny file leaves unproved without a message from Dafny.
 
-Dafny takes `assume`, `{:axiom}`, `{:verify false}`, a missing body… at their word and reports success. Each of them
-makes what rests on the file a hypothesis, shown as such. The scan is of tokens: comments and strings hide nothing and
-show nothing. What it does not know to be harmless counts as an open hypothesis.
+Dafny accepts `assume`, `{:axiom}`, `{:verify false}`, a missing body… without proof and reports success. Each of them
+becomes a hypothesis of every result from the file, shown as such. The scan works on tokens, so that comments and
+strings have no effect on it. Anything not known to be harmless counts as an open hypothesis.
 """
 
 from __future__ import annotations
@@ -14,16 +14,16 @@ from pathlib import PurePosixPath
 from avow.base.records import dataclass
 
 HARMLESS = frozenset({"autotriggers", "fuel", "induction", "opaque", "split", "tailrecursion", "timeLimit", "trigger"})
-"""Attributes that guide the prover or the compiler and take nothing for granted."""
+"""Attributes that guide the prover or the compiler and assume nothing."""
 SYNTAX = re.compile(r'"--function-syntax:[34]"')
-"""The one option that a module may set: it only says which spelling of ghost functions is meant."""
+"""The one option that a module may set: it only selects the spelling of ghost functions."""
 
 _CALLABLES = frozenset({"method", "lemma", "colemma", "constructor", "function", "predicate", "copredicate"})
 _MODIFIERS = frozenset(
     {"ghost", "static", "protected", "inductive", "twostate", "least", "greatest", "abstract", "opaque"}
 )
 MEMBERS = _CALLABLES | _MODIFIERS | {"const", "type", "module", "datatype", "codatatype", "newtype", "class", "import"}
-"""Words with which another member begins."""
+"""Words that begin another member."""
 _DIRECTIVE = re.compile(r"\s*#(?:if|else|elsif|endif)")
 _TOKEN = re.compile(
     r"""
@@ -49,16 +49,16 @@ class Token:
 
 @dataclass(frozen=True, slots=True)
 class Scan:
-    """What the file holds. Lines count from 1."""
+    """The content of the file. Lines count from 1."""
 
     hypotheses: tuple[tuple[int, str], ...]
-    """What it takes for granted."""
+    """Its unproved assumptions."""
     problems: tuple[tuple[int, str], ...]
     """Why it cannot be an implementation at all."""
     members: tuple[tuple[str, str], ...]
     """(kind, name) of every method and lemma that it declares: each must be found proved."""
     environment: str | None
-    """The body of the implementation's own `Env`, or None where it has none."""
+    """The body of the implementation's own `Env`, or None if it has none."""
     text: str
     """The file with its includes of generated files blanked out: the generated files are given to Dafny directly."""
 
@@ -70,8 +70,8 @@ def scan(
     generated: Sequence[str],
     lemmas: Sequence[str] = ("EnvNotEmpty",),
 ) -> Scan:
-    """`generated` are the names of the generated files, `lemmas` those that an implementation has to give."""
-    # Dafny reads a lone carriage return as the end of a line, and so of a comment.
+    """`generated` are the names of the generated files, `lemmas` those that an implementation has to provide."""
+    # Dafny reads a lone carriage return as the end of a line, and thus of a comment.
     text = text.replace("\r\n", "\n").replace("\r", "\n")
     return _Scanner(text, spec_module, impl_module, generated, lemmas).scan()
 
@@ -89,7 +89,7 @@ def tokens(text: str) -> list[Token]:
             end = match.end()
             kind = match.lastgroup or "sign"
             if match.group() == ":" and found and found[-1].text == "{":
-                # The start of an attribute, also where it is spread out; nothing else begins like that.
+                # The start of an attribute, also if it contains spaces; nothing else begins like that.
                 found[-1] = Token("sign", "{:", found[-1].line, found[-1].start, end)
             elif kind != "space":
                 found.append(Token(kind, match.group(), line, position, end))
@@ -113,8 +113,8 @@ def _comment_end(text: str, start: int) -> int:
 
 
 def resolved_environment(program: str, module: str) -> str | None:
-    """The body of `Env` as Dafny itself has it in that module, from the program that it prints once all names are
-    resolved and all refinements made; None where it is not there, or not once."""
+    """The body of `Env` in that module, from the program that Dafny prints after resolution and refinement; None if
+    there is not exactly one."""
     return _body_of_env(program, tokens(program), module)
 
 
@@ -130,7 +130,7 @@ def matching(found: Sequence[Token], at: int) -> int:
 
 
 def _body_of_env(text: str, found: Sequence[Token], module: str) -> str | None:
-    """What stands in classes, in modules within, or in other modules is another's."""
+    """The body of the module's own `Env`: those in classes, nested modules, or other modules do not count."""
     at, bodies, modules = 0, list[str | None](), 0
     while at < len(found):
         if found[at].text == "module":
@@ -143,7 +143,7 @@ def _body_of_env(text: str, found: Sequence[Token], module: str) -> str | None:
                 bodies += _envs(text, found, opened + 1, matching(found, opened))
             if opened is not None:
                 at = opened
-        # whatever stands in brackets is not at the top
+        # tokens in brackets are not at the top level
         at = matching(found, at) + 1 if found[at].text in ("{", "{:", "(", "[") else at + 1
     return bodies[0] if modules == 1 and len(bodies) == 1 else None
 
@@ -162,8 +162,8 @@ def _envs(text: str, found: Sequence[Token], at: int, end: int) -> list[str | No
 
 
 def _body(text: str, found: Sequence[Token], at: int, end: int) -> str | None:
-    """The first braces behind a name, if another member, or nothing, stands behind them: else they are part of a
-    clause, and what is meant is not guessed."""
+    """The first braces after a name, if another member, or nothing, follows them: else they are part of a clause, and
+    the body is not guessed."""
     while at < end and found[at].text != "{" and found[at].text not in MEMBERS:
         at = (matching(found, at) if found[at].text in ("(", "[", "{:") else at) + 1
     closed = matching(found, at)
@@ -183,7 +183,7 @@ class _Scanner:
         self.tokens = tokens(text)
         self.spec_module, self.impl_module = spec_module, impl_module
         self.generated = frozenset(generated)
-        # The specification names what it uses with its module, so these alone must not be declared anew.
+        # The specification uses qualified names, so only these must not be redeclared.
         self.names = frozenset({"Types", "Contract", spec_module})
         self.hypotheses: list[tuple[int, str]] = []
         self.problems: list[tuple[int, str]] = []
@@ -192,7 +192,7 @@ class _Scanner:
     def scan(self) -> Scan:
         blanked = self.text
         for number, line in enumerate(self.text.split("\n"), 1):
-            if _DIRECTIVE.match(line):  # also within what looks like a comment: it may take the comment away
+            if _DIRECTIVE.match(line):  # also within an apparent comment: it may remove the comment
                 self.hypotheses.append((number, "a preprocessor directive hides text from one reader or the other"))
         for at, token in enumerate(self.tokens):
             match token.text:
@@ -251,7 +251,7 @@ class _Scanner:
         if token.text in _CALLABLES and before != "type":
             kind = token.text
             if kind in ("function", "predicate") and self.text_at(at + 1) == "method":
-                return  # the word `method` that follows is met next
+                return  # the following word `method` is visited next
             if kind == "method" and before in ("function", "predicate"):
                 kind = before
             if kind == "predicate" and before in ("inductive", "least", "greatest"):
@@ -275,7 +275,7 @@ class _Scanner:
             self.members.append((kind, name.text))
 
     def constant(self, at: int) -> None:
-        """A constant without a value is whatever its type allows, were it nothing."""
+        """A constant without a value may be any value of its type, even if there is none."""
         name = self.name_after(at)
         if name is None:
             return
@@ -307,7 +307,7 @@ class _Scanner:
             self.open(name, f"declares {name.text} anew")
 
     def module(self) -> None:
-        """The implementation's module, at the top level, refining the generated one; once."""
+        """Check that the implementation's module, which refines the generated one, is at the top level, once."""
         depth, found, named = 0, 0, None
         for at, token in enumerate(self.tokens):
             if token.text in ("{", "{:"):

@@ -1,13 +1,13 @@
-"""This backend's numbers: how much is read, how far is searched, how much is shown; each with its reason."""
+"""This backend's numbers: limits of reading, search and display; each with its reason."""
 
 PROGRAM_BYTES = 2_000_000
-"""A larger file is no program that Dafny would verify in useful time."""
+"""A larger file is not a program that Dafny would verify in useful time."""
 
 VALUES_SHOWN = 3
-"""Values of a candidate that a reason tells: more fit in no sentence."""
+"""Values of a candidate in a reason: more do not fit in a sentence."""
 
 PROBLEMS_SHOWN = 6
-"""Of Dafny's complaints in a reason; its log has all."""
+"""The number of Dafny's complaints in a reason; its log has all."""
 
 MODEL_CHARACTERS = 4_000_000
-"""Of a counterexample's model, so that one without end fills no memory."""
+"""Characters of a counterexample's model, so that an endless one does not fill the memory."""
