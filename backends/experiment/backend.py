@@ -54,7 +54,7 @@ class ExperimentBackend(Backend):
         return (path,) if path is not None else ()
 
     def export(self, job: Job) -> Mapping[str, str]:
-        """The claim as it will be judged; nothing where options or data are at fault."""
+        """The claim as it will be judged; empty if options or data have errors."""
         try:
             experiment = read(job)
         except Rejected:
@@ -76,7 +76,7 @@ class ExperimentBackend(Backend):
         outcomes, logs = [], {}
         for o in job.obligations:
             outcome, logs[f"{o.name}.tsv"] = settle(o.name, experiment, job.kept.get(o.id, ()))
-            # what a part of the contract means in terms of columns is a person's judgement
+            # the meaning of a part of the contract in terms of columns is a person's judgement
             link = Link.GUIDED if experiment.claims[o.name].interpreted else self.link
             outcomes.append(replace(outcome, obligation=o.id, link=link))
         return Report(tuple(outcomes), "avow experiment", self.version, logs=logs)

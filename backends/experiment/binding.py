@@ -1,9 +1,9 @@
-"""How cells become values of a node's ports, and what a predicate of the contract means in terms of columns.
+"""The conversion of cells to values of a node's ports, and the meaning of predicates in terms of columns.
 
 An entry of `mapping` names a port's column, or its columns: ``[x, y]`` is a tuple, or a relation that holds at that
 point and nowhere else; ``{constructor: kind, move: [x, y]}`` is a value of an algebraic type. An entry of `interpret`
-replaces a predicate (``out.at(x, y)``), or a whole part of a guarantee, by a formula over columns. Nothing in the data
-shows that this is what the contract means, so it is an assumption.
+replaces a predicate (``out.at(x, y)``), or a whole part of a guarantee, by a formula over columns. The data cannot show
+that this is the contract's meaning, so it is an assumption.
 """
 
 from __future__ import annotations
@@ -32,12 +32,12 @@ _PREDICATE = re.compile(r"\s*(in|out)\.(\w+)\s*\(\s*(\w+(?:\s*,\s*\w+)*)\s*\)\s*
 
 
 class Unfit(Exception):  # noqa: N818 - it names what an entry, or a cell, is
-    """An entry that cannot give a value of its port, or a cell that holds none."""
+    """An entry that cannot give a value of its port, or a cell without one."""
 
 
 @dataclass(frozen=True, slots=True)
 class Binding:
-    """`name` is a port's, or a column's under a name of its own; `value` raises Unfit."""
+    """`name` is a port's name, or a column's own name; `value` raises Unfit."""
 
     name: str
     columns: tuple[str, ...]
@@ -67,7 +67,7 @@ def bound(name: str, sort: s.Sort, entry: Any) -> Binding:
 
 
 def _check_words(sort: s.Sort, words: Mapping[str, str]) -> None:
-    """Raises Unfit where a word stands for no value of the type, or is itself a value of it and stands for another. Any
+    """Raises Unfit if a word stands for no value of the type, or is itself a value of it and stands for another. Any
     text is a value of STRING."""
     for word, name in words.items() if sort != s.STRING else ():
         if (meant := _valued(name, sort)) is None:
@@ -125,7 +125,7 @@ def _cell(cells: Cells, column: str, sort: s.Sort, words: Mapping[str, str]) -> 
 
 
 def _valued(text: str, sort: s.Sort) -> Value | None:
-    """The value that a word is; None where it is none of its type."""
+    """The value of a word; None if it is not a value of the type."""
     match sort:
         case s.BoolSort():
             return WORDS.get(text.casefold())
@@ -173,8 +173,8 @@ class Interpretation:
 def interpretation(
     pattern: str, text: str, node: Node, contract: Contract, columns: Mapping[str, s.Sort], span: Span | None
 ) -> Interpretation:
-    """An entry of `interpret`; `columns` are those that a formula may name, with their types. Raises Rejected for text
-    that is no formula, and Unfit."""
+    """An entry of `interpret`; `columns` are those that a formula may name, with their types. Raises Rejected if a text
+    is not a formula, and Unfit."""
     over, whole, function = list[Variable](), None, ""
     if match := _PREDICATE.fullmatch(pattern):
         function = f"{match[1]}.{match[2]}"
@@ -202,7 +202,7 @@ def interpretation(
     free = {v for v in free_variables(formula) if v.role is Role.BOUND and v not in over}
     if not free:
         raise Unfit("its meaning names no column: it would be the same in every row")
-    # under a name and a role of its own, no quantifier of the guarantee binds a column
+    # with its own name and role, a column cannot be bound by a quantifier of the guarantee
     role = Role.OUTPUT if output else Role.INPUT
     columns_of = {v: Variable(role, f"column {v.name}", v.sort) for v in free}
     return Interpretation(
@@ -218,7 +218,7 @@ def interpretation(
 
 
 def interpreted(formula: Term, meanings: Iterable[Interpretation]) -> Term:
-    """A formula with what the meanings say in place of their patterns: whole parts first, then predicates."""
+    """A formula with the patterns replaced by their meanings: whole parts first, then predicates."""
     known = tuple(meanings)
     parts = {meaning(one.pattern): one.formula for one in known if one.pattern is not None}
     predicates = {one.function: one for one in known if one.pattern is None}

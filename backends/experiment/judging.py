@@ -32,31 +32,32 @@ Step = Mapping[str, Value]
 
 @dataclass(frozen=True, slots=True)
 class Claim:
-    """A guarantee, ready to be judged. `conditions` are those under which it demands something, with their text; a
-    guarantee without any demands something of every trial. `unseen` are assumptions whose inputs are not in the data.
+    """A guarantee, prepared for judging. `conditions` are those under which it demands something, with their text; a
+    guarantee without conditions demands something of every trial. `unseen` are assumptions whose inputs are not in the
+    data.
     """
 
     holds: Formula
     conditions: tuple[Formula, ...]
     demands: Evaluator | None
-    """Whether, of a step's inputs, some outputs would break it; None where that cannot be evaluated."""
+    """Whether, for a step's inputs, some outputs would violate it; None if that cannot be evaluated."""
     assumptions: tuple[Formula, ...]
     unseen: tuple[str, ...]
     missing: tuple[str, ...]
-    """Ports that the guarantee speaks of, and that are bound to no column."""
+    """Ports that the guarantee mentions and that are bound to no column."""
     reads: frozenset[str]
-    """What has values and is read: ports and columns."""
+    """The ports and columns that have values and are read."""
     remembers: bool
     cells: tuple[Cell, ...]
     interpreted: tuple[str, ...]
-    """What the interpretations say that it, or an assumption, needs."""
+    """The texts of the interpretations that it, or an assumption, needs."""
 
 
 @dataclass(frozen=True, slots=True)
 class Judged:
-    """What became of a trial. `met`: the places of the conditions that came about; `asked`: the guarantee demanded
-    something; `broken`: the step that breaks it; `excused`: an assumption did not hold, before any breach; `undecided`:
-    what could not be told."""
+    """The result of a trial. `met`: the indices of the conditions that were met; `asked`: the guarantee demanded
+    something; `broken`: the step that violates it; `excused`: an assumption did not hold, before any violation;
+    `undecided`: the name of what could not be decided."""
 
     met: frozenset[int] = frozenset()
     asked: bool = False
@@ -113,7 +114,7 @@ def judged(claim: Claim, steps: Sequence[Step]) -> Judged:
 
 
 def _demands(formula: Term) -> Evaluator | None:
-    """A formula may demand nothing of some inputs though it has no condition that one can read off."""
+    """A formula may demand nothing for some inputs although it has no explicit condition."""
     outputs = [port for port in ports_of(formula) if port.role is Role.OUTPUT]
     if histories(formula) or any(isinstance(port.sort, FunctionSort) for port in outputs):
         return None
@@ -127,7 +128,7 @@ def _demands(formula: Term) -> Evaluator | None:
     known: dict[tuple[Value, ...], Value] = {}
 
     def demands(values: Mapping[str, Value]) -> Value:
-        """As `asked`, once of equal inputs."""
+        """As `asked`, computed once for equal inputs."""
         key = tuple(values[name] for name in given)
         if key not in known:
             known[key] = asked(values)
@@ -144,7 +145,8 @@ def _demanded(claim: Claim, values: Step) -> bool:
 
 
 def _conditions(formula: Term, assumed: Mapping[str, Term]) -> tuple[Term, ...]:
-    """Of a response, that all of what it demands has come due; else those that can come about under the assumptions."""
+    """For a response, that its whole demand has become due; else the conditions that are possible under the
+    assumptions."""
     response = due(formula)
     if response is None:
         apart = conditions(conjunction(_by_cases(formula, iter(range(CASES)))))
@@ -157,7 +159,7 @@ def _conditions(formula: Term, assumed: Mapping[str, Term]) -> tuple[Term, ...]:
 
 
 def _by_cases(formula: Term, left: Iterator[int], when: tuple[Term, ...] = ()) -> Iterator[Term]:
-    """``y == (if b then s else t)`` says one thing under b and another under ``not b``, where inputs tell which."""
+    """``y == (if b then s else t)`` as one part under b and one under ``not b``, if b is about inputs only."""
     choices = (part for part in subterms(formula) if isinstance(part, Conditional) and part.sort != BOOL)
     choice = next((c for c in choices if all(v.role is Role.INPUT for v in free_variables(c.condition))), None)
     if choice is None or next(left, None) is None:
@@ -169,7 +171,7 @@ def _by_cases(formula: Term, left: Iterator[int], when: tuple[Term, ...] = ()) -
 
 
 def _ways(condition: Condition) -> Iterator[Term]:
-    """``a or b -> c`` demands c under a, and under b: who tried a has not tried b."""
+    """``a or b -> c`` demands c under a, and under b: a trial of a is not a trial of b."""
     choices = [(part, items) for part in condition.parts if (items := _choices(part))]
     if not choices or sum(len(items) for _, items in choices) > CASES:
         yield condition.formula

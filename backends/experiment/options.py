@@ -1,4 +1,4 @@
-"""The options of an experiment in plan.yaml, its data, and each guarantee ready to be judged; or all that is wrong."""
+"""The options of an experiment in plan.yaml, its data, and each guarantee prepared for judging; or all errors."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ SCHEMA = schema(
 )
 
 RUN_COLUMNS = ("run", "trial", "id")
-"""Where the names of runs are looked for, unless the plan says otherwise."""
+"""The columns that may contain the names of runs, unless the plan names one."""
 
 FLOORS = {"high": Fraction(9, 10), "medium": Fraction(4, 5), "low": Fraction(1, 2)}
 """Criticality of the node → the least success rate that may be claimed, or shown."""
@@ -100,7 +100,7 @@ class Run:
 
 @dataclass(frozen=True, slots=True)
 class Experiment:
-    """`claims` are by the guarantee's name, the others the options, in exact numbers."""
+    """`claims` are by the guarantee's name; the others are the options, in exact numbers."""
 
     runs: tuple[Run, ...]
     claims: Mapping[str, Claim]
@@ -113,16 +113,16 @@ class Experiment:
     trial: Trial
     protocol: str
     left_out: tuple[str, ...] = ()
-    """Failing runs that the plan says are rightly no longer among the data, and why."""
+    """Failing runs that the plan declares as left out of the data; `because` is the reason."""
     because: str = ""
 
     def values(self, rows: Iterable[Mapping[str, str]]) -> tuple[Step, ...]:
-        """Raises Unfit, and KeyError where a cell is missing."""
+        """Raises Unfit, and KeyError if a cell is missing."""
         return tuple({b.name: b.value(cells) for b in self.bindings} for cells in rows)
 
 
 def read(job: Job) -> Experiment:
-    """Raises Rejected, with all that is wrong of options and data."""
+    """Raises Rejected, with all errors of options and data."""
     reader = _Reader(job)
     found = reader.experiment()
     if found is None or reader.found:
@@ -189,7 +189,7 @@ class _Reader:
         if key not in self.options:
             return default
         try:
-            return exact(str(self.options[key]))  # of a float what the person typed
+            return exact(str(self.options[key]))  # for a float the digits as typed
         except ValueError:
             self.add(key, f"'{key}' must be a number")
             return None
@@ -202,7 +202,7 @@ class _Reader:
             self.found.extend(rejected.diagnostics)
             return None
 
-    # -- what columns mean ---------------------------------------------------------------------------------------------
+    # -- the meaning of columns ----------------------------------------------------------------------------------------
 
     def _mapped(self, table: Table) -> Iterator[Binding]:
         ports = {p.variable.qualified: p.sort for p in (*self.job.node.inputs, *self.job.node.outputs)}
@@ -229,7 +229,7 @@ class _Reader:
                 self.found.extend(rejected.diagnostics)
 
     def _measured(self, bindings: Iterable[Binding], meanings: Iterable[Interpretation]) -> None:
-        """An output that is read off an input's column is no measurement."""
+        """An output that is read from an input's column is not a measurement."""
         given = {column for b in bindings if b.name.startswith("in.") for column in b.columns}
         for b in bindings:
             if b.name.startswith("out.") and (shared := given & {*b.columns}):
@@ -257,7 +257,7 @@ class _Reader:
         return claims
 
     def _read(self, bindings: Iterable[Binding], claims: Mapping[str, Claim]) -> list[Binding]:
-        """What some guarantee, or an assumption that can be judged, reads; the others are no business of it."""
+        """The bindings that a guarantee, or an assumption that can be judged, reads."""
         used = {name for one in claims.values() for name in one.reads}
         return [binding for binding in bindings if binding.name in used]
 
@@ -319,7 +319,7 @@ class _Reader:
 
 
 def _identity(name: str) -> str | Fraction:
-    """Equal for names that a person reads as one: `1` and `01`, `Run 1` and `run 1`."""
+    """Equal for names that a person reads as the same: `1` and `01`, `Run 1` and `run 1`."""
     try:
         return exact(name)
     except ValueError:
@@ -327,11 +327,11 @@ def _identity(name: str) -> str | Fraction:
 
 
 def _sort(table: Table, column: str) -> Sort:
-    """Of a column in a formula: BOOL where each cell is a word for it, else REAL."""
+    """The sort of a column in a formula: BOOL if each cell is a word for a truth value, else REAL."""
     words = {word for word in WORDS if word.isalpha()}
     return BOOL if all(row.cells[column].casefold() in words for row in table.rows) else REAL
 
 
 def told(options: Mapping[str, Any]) -> dict[str, Any]:
-    """The options that say what is claimed, for the exported claim."""
+    """The options that define the claim, for the exported claim."""
     return {key: value for key, value in options.items() if key not in ("left_out", "protocol")}

@@ -17,12 +17,12 @@ def upper_bound(failures: int, trials: int, confidence: Fraction) -> Fraction:
 
 
 def runs_needed(most: Fraction, confidence: Fraction) -> int | None:
-    """How many runs without a failure would show that a run fails with probability at most `most`; None: very many."""
+    """The number of runs without a failure that would show a failure probability of at most `most`; None: very many."""
     return _least(RUNS_NEEDED, lambda n: shows(0, n, most, confidence))
 
 
 def _least(most: int, holds: Callable[[int], bool]) -> int | None:
-    """The least number from 0 to `most` of which it holds, as of all greater ones; None where there is none."""
+    """The least number from 0 to `most` for which `holds`, as for all greater ones; None if there is none."""
     if not holds(most):
         return None
     low, high = -1, most

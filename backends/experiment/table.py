@@ -31,7 +31,7 @@ class Table:
         return _fault(self.path, line, code, message, hint)
 
     def confused(self, wanted: str) -> Diagnostic | None:
-        """What is wrong with a column that the plan names."""
+        """The error of a column that the plan names, if any."""
         if wanted not in self.columns:
             hint = f"columns: {', '.join(self.columns)}"
             return self.fault(1, "EXP112", f"there is no column '{wanted}'", hint)
@@ -42,7 +42,7 @@ class Table:
 
 
 def read_table(path: Path) -> Table:
-    """Raises Rejected with all that is wrong."""
+    """Raises Rejected with all errors."""
     lines = list(_lines(path))
     if len(lines) < 2:
         needed = "a line with the names of the columns" if not lines else "at least one row below the names"

@@ -1,23 +1,23 @@
-"""This backend's numbers: how much is read, how far is searched, how much is shown; each with its reason."""
+"""This backend's numbers: limits of reading, search and display; each with its reason."""
 
 FAILURES_SHOWN = 20
-"""Failing runs that are spelt out."""
+"""Failing runs that are named."""
 
 FAILURES_KEPT = 200
-"""Failing runs that are kept in a record: more than anybody leaves out one by one."""
+"""Failing runs that are kept in a record: more than a plan would leave out one by one."""
 
 ROWS = 100_000
-"""Of one table: of a larger campaign several tables are made."""
+"""Rows of one table: a larger campaign has several tables."""
 
 TABLE_BYTES = 32_000_000
-"""Of one table: as many rows of a few hundred characters each."""
+"""Bytes of one table: as many rows of a few hundred characters each."""
 
 GRID = 100_000
 """Bounds are multiples of its inverse, rounded up: five decimals are more than any number of runs justifies."""
 
 RUNS_NEEDED = 1_000_000
-"""Up to so many runs it is told how many would be enough."""
+"""The sufficient number of runs is reported up to this many."""
 
 CASES = 16
-"""Choices of a guarantee, and ways to meet one condition, that are told apart. Each is a stratum, which takes its share
-of the confidence."""
+"""Choices of a guarantee, and ways to meet one condition, that are distinguished. Each is a stratum, which takes its
+share of the confidence."""

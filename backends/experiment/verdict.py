@@ -1,7 +1,7 @@
-"""From judged runs to a verdict and its words.
+"""From judged runs to a verdict and its text.
 
-Deleting the rows of failing runs would let a refutation be forgotten. So failing runs are kept in the ledger
-(`avow.evidence.record.CASE`), and a plan that leaves one out has to say why.
+Deleting the rows of failing runs would remove a refutation. So failing runs are kept in the ledger
+(`avow.evidence.record.CASE`), and a plan that leaves one out has to give a reason.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from .tuning import FAILURES_KEPT, FAILURES_SHOWN
 @dataclass(frozen=True, slots=True)
 class _Sample:
     """The runs that met the guarantee's condition, in strata: each condition under each value of the column `strata`.
-    A run that breaks an assumption is none of them."""
+    A run that violates an assumption is not included."""
 
     strata: tuple[Stratum, ...]
     triggered: int
@@ -45,8 +45,8 @@ class _Sample:
 
 
 def settle(name: str, experiment: Experiment, kept: Iterable[Sequence[Mapping[str, Any]]]) -> tuple[Outcome, str]:
-    """The outcome for a guarantee, without its obligation, and what became of each run, as tab-separated lines. `kept`:
-    runs that failed once."""
+    """The outcome for a guarantee, without its obligation, and the result of each run, as tab-separated lines. `kept`:
+    runs that failed before."""
     claim = experiment.claims[name]
     found = [(run, judged(claim, run.steps)) for run in experiment.runs]
     log = "".join(f"{run.name}\t{_word(claim, one)}\n" for run, one in found)
@@ -98,7 +98,7 @@ def _sample(claim: Claim, found: Sequence[tuple[Run, Judged]], experiment: Exper
     for run, one in found:
         if not one.excused:
             for n in conditions:
-                # a breach counts under every condition where none is known to be met
+                # a violation counts under every condition if none is known to be met
                 if (n is None and one.asked) or n in one.met or (one.broken is not None and not one.met):
                     counts[run.stratum, n][0] += 1
                     counts[run.stratum, n][1] += one.broken is not None
@@ -125,7 +125,7 @@ def _name(claim: Claim, experiment: Experiment, stratum: str, condition: int | N
 
 
 def _unmet(claim: Claim, found: Sequence[tuple[Run, Judged]]) -> str:
-    """Why the runs tried nothing; empty where each condition came about in some of them."""
+    """Why the runs show nothing; empty if each condition was met in some of them."""
     runs, counted = count(len(found), "run"), [one for _, one in found if not one.excused]
     if not counted:
         return f"no run counts: {runs}, and each breaks an assumption"
@@ -196,14 +196,14 @@ def _row(stratum: Stratum) -> dict[str, Any]:
     }
 
 
-# -- runs that failed once --------------------------------------------------------------------------------------------
+# -- runs that failed before ------------------------------------------------------------------------------------------
 
 
 def _held_against(
     outcome: Outcome, claim: Claim, experiment: Experiment, kept: Iterable[Sequence[Mapping[str, Any]]]
 ) -> Outcome:
-    """The outcome, but `unknown` where runs that failed before are missing, unless the plan says of each why it is left
-    out. That is then an assumption."""
+    """The outcome, but `unknown` if runs that failed before are missing, unless the plan gives a reason for leaving
+    each out. That is then an assumption."""
     if outcome.verdict in (Verdict.REFUTED, Verdict.ERROR):
         return outcome
     missing = dict.fromkeys(
@@ -220,7 +220,7 @@ def _held_against(
 
 
 def _fails(run: Mapping[str, Any], claim: Claim, experiment: Experiment) -> bool:
-    """Whether a kept run fails by the guarantee as it is read today; one whose cells give no values does."""
+    """Whether a kept run violates the guarantee as it is now; so does one whose cells give no values."""
     try:
         return judged(claim, experiment.values(run["rows"])).broken is not None
     except (Unfit, KeyError):
@@ -228,7 +228,7 @@ def _fails(run: Mapping[str, Any], claim: Claim, experiment: Experiment) -> bool
 
 
 def _is_there(kept: Mapping[str, Any], experiment: Experiment) -> bool:
-    """Whether a kept run is among the data, under its name and with what was measured."""
+    """Whether a kept run is among the data, under its name and with the same measurements."""
     return any(run.name == kept["run"] and _same(kept.get("rows", ()), run.rows) for run in experiment.runs)
 
 
