@@ -1,7 +1,7 @@
 """A person's recorded review (see `docs/backends/review.md`).
 
-`record` reads it, and says whether what was read is still what stands there; `signature` who signed it; `stamp` fills
-the digests in.
+`record` reads it, and checks whether the reviewed files and guarantees have changed; `signature` checks who signed it;
+`stamp` fills in the digests.
 """
 
 from .backend import ReviewBackend

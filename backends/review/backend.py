@@ -1,4 +1,4 @@
-"""The review backend: a person's recorded review as evidence, for as long as nothing that was reviewed has changed."""
+"""The review backend: a person's recorded review as evidence, as long as nothing that was reviewed has changed."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ class ReviewBackend(Backend):
         return (Diagnostic("REV104", f"the review does not count: {said}", record.span, Severity.WARNING),)
 
     def files(self, job: Job) -> tuple[Path, ...]:
-        """The record, its signature, the keys that may have signed it, and everything that was read."""
+        """The record, its signature, the keys that may have signed it, and all files that were read."""
         name = record_name(job)
         path = inside(job.root, name) if name else None
         if path is None:
@@ -77,7 +77,7 @@ class ReviewBackend(Backend):
         return tuple(dict.fromkeys((path, *(p for p in others if p is not None))))
 
     def export(self, job: Job) -> Mapping[str, str]:
-        """What a reviewer is to judge: every guarantee with the digest of its meaning."""
+        """The guarantees that a reviewer has to judge, each with the digest of its meaning."""
         claims = {
             o.name: {"claim": o.claim, "formula": o.formula, "meaning": current_meaning(job.node, o.name)}
             for o in job.obligations
@@ -113,7 +113,7 @@ def _keys(job: Job) -> tuple[Path, ...]:
 
 
 def _read(job: Job) -> tuple[Record, Path]:
-    """The record, held against plan and contract, and where it is. Raises Rejected."""
+    """The record, checked against plan and contract, and its path. Raises Rejected."""
     problems = []
     path = existing_file(job, "record", record_name(job) or "", wrong="REV101", absent="REV102")
     record = read_record(path)
@@ -166,7 +166,7 @@ def _settle(job: Job, record: Record, said: Opened | str | None, obligation: Obl
             summary += " (it had been rejected)"
         details["stale"] = stale
         hypotheses = ()
-    elif isinstance(said, str) and conclusion != "rejected":  # what was found wrong needs nobody's name
+    elif isinstance(said, str) and conclusion != "rejected":  # a rejection counts without a signature
         verdict, summary, hypotheses = Verdict.UNKNOWN, f"the review does not count: {said}", ()
     elif conclusion == "rejected":
         why = (judged.remark if judged else "") or record.remarks or _against(record)

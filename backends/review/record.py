@@ -1,7 +1,7 @@
-"""A review as a person writes it down: who read what, what was asked, what was concluded, and for which contract.
+"""A review as a person records it: who read what, the questions, the conclusion, and the contract.
 
 The file is YAML, with one digest for each file read and each guarantee judged: a review is of *these* bytes and *this*
-meaning, and goes stale like a proof. `avow review stamp` fills the digests in.
+meaning, and becomes stale like a proof. `avow review stamp` fills in the digests.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from avow.language.contract import Node
 from avow.system.strict_yaml import Piece, read_yaml
 
 FORMAT = 1
-"""Of the record. A later format is refused, not guessed at."""
+"""The version of the record. A later one is rejected, not guessed."""
 CONCLUSIONS = ("accepted", "conditional", "rejected")
 """From best to worst."""
 ANSWERS = ("yes", "no", "n/a")
@@ -43,7 +43,7 @@ class Reading:
 
 @dataclass(frozen=True, slots=True)
 class Judged:
-    """A guarantee that the review speaks of, the digest of its meaning then, and its own conclusion, if it has one."""
+    """A guarantee in the review, the digest of its meaning at that time, and its own conclusion, if any."""
 
     clause: str
     meaning: str | None
@@ -89,7 +89,7 @@ def read_record(path: Path) -> Record:
 
 
 def record_in(piece: Piece, problems: Sequence[Diagnostic]) -> Record:
-    """The record that a YAML text says. Raises Rejected, with every problem and its place."""
+    """The record in a YAML text. Raises Rejected, with every problem and its place."""
     return _RecordReader(piece, list(problems)).read()
 
 
@@ -139,7 +139,7 @@ class _RecordReader:
         clauses: tuple[Judged, ...],
         top: dict[str, Piece],
     ) -> None:
-        """A conclusion that its own answers speak against is no conclusion."""
+        """Report a conclusion that contradicts its own answers."""
         place = top["conclusion"].span if "conclusion" in top else self.piece.span
         if conclusion == "conditional" and not conditions:
             self.add("REV113", "a conditional acceptance must list its 'conditions'", place)
@@ -236,7 +236,7 @@ class _RecordReader:
         text = self.text(key, top, where=where)
         if not text:
             return ""
-        # YAML's own words for yes and no come as true and false in some editors' hands
+        # some editors write YAML's yes and no as true and false
         text = {"true": "yes", "false": "no"}.get(text, text) if "yes" in known else text
         if text not in known:
             self.add("REV118", f"'{key}' cannot be '{text}'", top[key].span, f"one of {', '.join(known)}")
@@ -253,7 +253,7 @@ class _RecordReader:
         return text
 
     def digest(self, key: str, top: dict[str, Piece]) -> str | None:
-        """None where it has not been filled in yet."""
+        """None if it has not been filled in yet."""
         piece = top.get(key)
         if piece is None or (piece.items is None and piece.entries is None and piece.text.strip() in ("", "?", "~")):
             return None
@@ -267,7 +267,7 @@ class _RecordReader:
         self.problems.append(Diagnostic(code, message, span, hint=hint))
 
 
-# Whether a review still speaks of what is there now
+# Whether a review is still about the current files and guarantees
 
 
 def current_meaning(node: Node, clause: str) -> str:
@@ -276,7 +276,7 @@ def current_meaning(node: Node, clause: str) -> str:
 
 
 def current_file(root: Path, name: str) -> str | None:
-    """The digest of a file of the system's folder; None where it is not there."""
+    """The digest of a file of the system's folder; None if it does not exist."""
     path = inside(root, name)
     try:
         return digest_file(path) if path is not None and path.is_file() else None
@@ -285,7 +285,7 @@ def current_file(root: Path, name: str) -> str | None:
 
 
 def stale_files(record: Record, root: Path) -> tuple[str, ...]:
-    """What has happened to the files since they were read, in words."""
+    """The changes of the files since they were read, in words."""
     found = []
     for reading in record.read:
         if reading.file is None:
@@ -301,7 +301,7 @@ def stale_files(record: Record, root: Path) -> tuple[str, ...]:
 
 
 def stale_clause(record: Record, node: Node, clause: str) -> str | None:
-    """What has happened to a guarantee since it was judged, in words; None: nothing."""
+    """The change of a guarantee since it was judged, in words; None if it is unchanged."""
     judged = next((j for j in record.clauses if j.clause == clause), None)
     if judged is None:
         return f"the review of {record.date} does not speak of {clause}"

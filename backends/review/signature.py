@@ -1,7 +1,7 @@
 """Signed records: an in-toto statement about a record's bytes in a DSSE envelope, beside it as ``<record>.sig``.
 
-A name in a record is whatever somebody wrote there. With a signature the holder of a key vouches for the text; whose
-key counts says the plan.
+A name in a record is only text. With a signature the holder of a key vouches for the text; the plan says whose key
+counts.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ PREDICATE = "https://avow.invalid/signed-review/v1"
 
 
 def sign_record(path: Path, private: Path) -> Path:
-    """Sign a record as it is now; the signature's path. Raises Rejected: no record, no such key; OSError."""
+    """Sign a record as it is now; the signature's path. Raises Rejected if record or key do not exist; OSError."""
     record = read_record(path)
     statement = {
         "_type": "https://in-toto.io/Statement/v1",
@@ -34,8 +34,8 @@ def sign_record(path: Path, private: Path) -> Path:
 
 
 def signed(path: Path, record: Record, trusted: Sequence[Path]) -> Opened | str | None:
-    """Who signed a record's bytes, or why its signature does not count; None where there is none and none is asked.
-    With `trusted` public keys one of them has to have signed it."""
+    """The signer of a record's bytes, or why its signature does not count; None if there is none and none is required.
+    With `trusted` public keys, one of them must have signed it."""
     place = signature_path(path)
     if not place.exists():
         return f"no key of the plan has signed it ({place.name} is not there)" if trusted else None

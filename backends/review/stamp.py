@@ -1,7 +1,7 @@
-"""Fills the digests of a review in, where they belong in the reviewer's own file; all else stays as it was written.
+"""Fills in the digests of a review, in place in the reviewer's own file; all else stays as it was written.
 
-A digest that is already there and no longer right is replaced only with the date of the renewed review: a stamp says
-"I have read this", so it must not be refreshed by habit.
+An existing digest that is out of date is replaced only with the date of the renewed review: a stamp means "I have read
+this", so it must not be refreshed by habit.
 """
 
 from __future__ import annotations
@@ -28,17 +28,17 @@ _PLAIN = re.compile(r"[\w./-]+", re.ASCII)
 
 
 def stamp(folder: Path, node: str, *, method: str | None = None, renewed: str | None = None) -> tuple[str, ...]:
-    """Stamp the review of a node of the system in `folder`; says what was filled in, one line for each digest.
+    """Stamp the review of a node of the system in `folder`; returns one line for each digest that was filled in.
 
-    `method` tells several reviews of one node apart. `renewed` is the date (ISO) of a renewed review: without it, a
-    digest that is there already is never replaced. Raises Rejected.
+    `method` distinguishes several reviews of one node. `renewed` is the date (ISO) of a renewed review: without it, an
+    existing digest is never replaced. Raises Rejected.
     """
     path, job = record_of(folder, node, method)
     return stamp_record(path, job.root, job.node, job.method.guarantees, renewed=renewed)
 
 
 def record_of(folder: Path, node: str, method: str | None) -> tuple[Path, Job]:
-    """Where the review of a node keeps its record, and its job. Raises Rejected."""
+    """The path of the record of a node's review, and its job. Raises Rejected."""
     hint = "add one to plan.yaml: review: {record: reviews/….yaml}"
     job = job_for(folder, node, "review", method, wrong="REV120", hint=hint)
     name = record_name(job)
@@ -66,7 +66,7 @@ def stamp_record(
         raise Rejected(*(Diagnostic("REV121", message, span, hint=hint) for message, span in changed))
     date = piece.entries.get("date")
     if editor.changed and renewed is not None and date is not None:
-        if not wrong_day(date.text) and renewed < date.text:  # what is no day, or still to come, is mended by it
+        if not wrong_day(date.text) and renewed < date.text:  # an invalid or future day is corrected by it
             message = f"the review of {date.text} cannot have been renewed on {renewed}"
             raise Rejected(Diagnostic("REV112", message, date.span))
         editor.replace(date.span, renewed)
@@ -87,7 +87,7 @@ def stamp_record(
 
 
 def _besides(record: Piece) -> dict[str, object]:
-    """What a record says besides digests and the date: what stamping must leave as it was."""
+    """The content of a record without digests and date: stamping must not change it."""
     found: dict[str, object] = {}
     for key, piece in (record.entries or {}).items():
         if key == "read" and piece.items is not None:
@@ -169,7 +169,7 @@ class _Edit:
 
 
 class _Editor:
-    """Changes stretches of a text, and knows what was filled in, and what had another digest; places are those of the
+    """Edits parts of a text, and records which digests were filled in and which had changed; positions are those of the
     text before any change."""
 
     def __init__(self, text: str) -> None:
