@@ -1,6 +1,6 @@
-"""The command line: a module a command, imported when it is called.
+"""The command line: one module per command, imported when it is called.
 
-Exit codes, the same for all: 0 all is well; 1 a gate or a check fails; 2 bad input or usage; 3 a needed tool failed.
+Exit codes, the same for all: 0 success; 1 a gate or a check fails; 2 bad input or usage; 3 a needed tool failed.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from typing import Any
 from avow.base.module_path import leave_here
 from avow.base.suggestions import did_you_mean
 
-leave_here()  # before anything is imported that a folder of somebody else's could have a module for
+leave_here()  # before any import that a module in another's folder could replace
 
 import click  # noqa: E402
 
@@ -50,7 +50,7 @@ COMMANDS = {
     "verify": "verify every system: check, compose, discharge, report",
     "worker": "start a worker that executes jobs of `avow verify --on` on another machine",
 }
-"""Name → one line of help. The module of that name in this package holds the click command `command`."""
+"""Name → one line of help. The module of that name in this package has the click command `command`."""
 
 _OF_BACKENDS = {
     "agent": "avow.backends.ajpf.command",
@@ -98,7 +98,7 @@ def main(arguments: list[str] | None = None) -> None:
     """The entry point. Bad input ends with located messages and code 2, never with a traceback."""
     from avow.base.diagnostics import Rejected
 
-    for stream in (sys.stdout, sys.stderr):  # a sign that the terminal has not, or a file's name that is no text
+    for stream in (sys.stdout, sys.stderr):  # characters that the terminal lacks, or a file name that is not text
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")
     try:
@@ -120,10 +120,10 @@ def main(arguments: list[str] | None = None) -> None:
         kill_all()
         print("interrupted", file=sys.stderr)
         code = 130
-    except BrokenPipeError:  # the reader of our output has left: `avow … | head`
+    except BrokenPipeError:  # the reader of our output has ended: `avow … | head`
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         code = 0
-    except OSError as error:  # a full disk, a folder that cannot be written: where no command knows better
+    except OSError as error:  # a full disk, an unwritable folder: if no command handles it
         print(f"error: {error}", file=sys.stderr)
         code = 2
     sys.exit(code)

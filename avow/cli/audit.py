@@ -1,4 +1,4 @@
-"""``avow audit``: is the ledger what was written, and is everything that it refers to still there?"""
+"""``avow audit``: is the ledger unchanged, and does everything that it refers to still exist?"""
 
 from __future__ import annotations
 
@@ -107,7 +107,7 @@ def command(
 
 
 def _ledger_names(place: Workspace, wanted: Sequence[str], anchors: Sequence[Anchor] = ()) -> tuple[str, ...]:
-    """The systems named, or all that have a ledger, or had one by what the index of ledgers and `anchors` say. Raises
+    """The systems named, or all that have a ledger, or had one according to the index of ledgers and `anchors`. Raises
     Rejected for one that never had any."""
     there = [path.stem for path in place.ledgers.glob("*.jsonl")] if place.ledgers.is_dir() else []
     known = sorted({*there, *_index(place).systems, *(anchor.system for anchor in anchors)})
@@ -120,7 +120,7 @@ def _ledger_names(place: Workspace, wanted: Sequence[str], anchors: Sequence[Anc
 
 
 def _outside_heads(path: Path) -> tuple[Anchor, ...]:
-    """The ledgers' heads that a report or attestation, kept elsewhere, names. Raises Rejected where it names none."""
+    """The ledgers' heads named in a report or attestation that is kept elsewhere. Raises Rejected if it names none."""
     try:
         found = stated_heads(path, "")
     except OSError as error:
@@ -133,7 +133,7 @@ def _outside_heads(path: Path) -> tuple[Anchor, ...]:
 def _audit_system(
     place: Workspace, name: str, public_key: Path | None = None, anchors: Sequence[Anchor] = ()
 ) -> tuple[tuple[Discrepancy, ...], int]:
-    """The discrepancies of one system's ledger, and how many records it has. Raises Rejected if it cannot be read."""
+    """The discrepancies of one system's ledger, and its number of records. Raises Rejected if it cannot be read."""
     ledger, surveyed = Ledger(place.ledger(name)), _surveyed(place, name)
     with readable(ledger.path):
         found = discrepancies(place, ledger, surveyed, anchors, strict=True)
@@ -143,11 +143,11 @@ def _audit_system(
 
 
 def _edited(place: Workspace, surveyed: Survey) -> Iterable[Discrepancy]:
-    """The generated files that somebody has edited: people read them in place of the contract and the ledger."""
+    """The edited generated files: people read them instead of the contract and the ledger."""
     paths = [*edited_pages(place, surveyed)]
     for work in surveyed.catalogue.works:
         if not work.is_engine:
-            with contextlib.suppress(Rejected):  # what a backend refuses is an error of the plan: see `avow check`
+            with contextlib.suppress(Rejected):  # a rejection by a backend is an error of the plan: see `avow check`
                 paths += edited(place, work)
     for path in paths:
         name = place.relative(path)
@@ -164,7 +164,7 @@ def _surveyed(place: Workspace, name: str) -> Survey | None:
 
 
 def _audit_index(place: Workspace, public_key: Path | None = None) -> tuple[Discrepancy, ...]:
-    """What is wrong with the index of ledgers as a whole. Raises Rejected if it cannot be read."""
+    """The discrepancies of the index of ledgers as a whole. Raises Rejected if it cannot be read."""
     path, index = index_path(place.ledgers), _index(place)
     damage = tuple(Discrepancy(Fault.LEDGER, "index", text) for text in index.damage)
     if not index.exists and not public_key:
@@ -183,7 +183,7 @@ def _head_of(ledger: Ledger) -> Signed:
 
 
 def _signature(file: Path, signed: Signed, public_key: Path | None, grows: bool = False) -> Iterable[Discrepancy]:
-    """With a key of the auditor's own everything must be covered by a signature of it."""
+    """With a key of the auditor's own, a signature by it must cover everything."""
     path = signature_path(file)
     if not path.exists():
         if public_key:

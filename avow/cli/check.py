@@ -1,4 +1,4 @@
-"""``avow check``: diagnostics for .rcl files, in milliseconds; for a system's folder, of its plan too."""
+"""``avow check``: diagnostics for .rcl files, in milliseconds; for a system's folder, also of its plan."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ def _explain(found: list[Diagnostic]) -> None:
 
 
 def _codes(found: list[Diagnostic]) -> Mapping[str, Code]:
-    """What is known of codes; of the backends' only where there is one."""
+    """The known codes; those of backends only if one occurs."""
     from avow.base.codes_workspace import CORE_CODES
 
     if all(d.code in CORE_CODES for d in found):
@@ -142,7 +142,7 @@ def _system(folder: Path, found: list[Diagnostic]) -> tuple[list[Path], frozense
 
 
 def _shelf(folder: Path) -> Shelf:
-    """Where it is kept what the nodes of a system say, as `avow verify` has it."""
+    """The cache of a system's read nodes, the same as for `avow verify`."""
     from avow.base.remembered import Shelf
     from avow.pipeline.engine_code import reading_digest
 
@@ -150,21 +150,21 @@ def _shelf(folder: Path) -> Shelf:
 
 
 def _of_plan(folder: Path, shelf: Shelf) -> Iterator[Diagnostic]:
-    """What there is to say of the folder's plan beside its contract files (which are checked already)."""
+    """The diagnostics of the folder's plan, without those of its contract files (which are checked already)."""
     from avow.pipeline.plan_check import of_plan, of_rest
     from avow.system.load import load_system
 
     try:
         found = of_plan(load_system(folder, shelf), shelf=shelf)
     except Rejected as rejected:
-        # what is wrong in contract files is reported already; a formula of the plan has faults of the same codes
+        # errors in contract files are already reported; formulas of the plan have errors with the same codes
         every = (*rejected.diagnostics, *of_rest(folder))
         found = tuple(d for d in every if not (d.code.startswith("RCL") and d.span and d.span.file.endswith(".rcl")))
     yield from (_as_told(d, folder) for d in found)
 
 
 def _as_told(found: Diagnostic, folder: Path) -> Diagnostic:
-    """With the path under the folder as the command was told it; tools get absolute ones."""
+    """The diagnostic with its path under the folder as given to the command; tools get absolute ones."""
     if found.span is None or not Path(found.span.file).is_absolute():
         return found
     path, root = Path(found.span.file), folder.resolve()
@@ -173,7 +173,7 @@ def _as_told(found: Diagnostic, folder: Path) -> Diagnostic:
 
 
 def _off(folder: Path) -> frozenset[str]:
-    """The lints that the plan beside a file switches off; none where there is no readable plan."""
+    """The lints that the plan beside a file switches off; none if there is no readable plan."""
     if not (folder / "plan.yaml").is_file():
         return frozenset()
     from avow.system.plan_file import read_plan

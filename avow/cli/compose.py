@@ -33,8 +33,8 @@ from avow.solving.limits import from_seconds
 
 @dataclass(slots=True)
 class Progress:
-    """Of questions by their names: the answers so far, on one line of a terminal's stderr; nothing is written where it
-    is none."""
+    """The answers so far, by the names of the claims, on one line of stderr; nothing is written if it is not a
+    terminal."""
 
     total: int
     answers: dict[str, str] = field(default_factory=dict)
@@ -56,7 +56,7 @@ class Progress:
 
 @contextmanager
 def progress(total: int) -> Iterator[Progress]:
-    """Who is interrupted loses nothing: the answers so far are listed on stderr, and said not to be final."""
+    """On an interrupt, the answers so far are listed on stderr, with a note that none is final."""
     telling = Progress(total)
     try:
         yield telling
@@ -117,7 +117,7 @@ def command(
             return 1
         click.echo(to_rcl(derived_contract(composition, goal)), nl=False)
         return 0
-    if goals:  # a derivation stands only with those of the subsystems that it is made of
+    if goals:  # a derivation holds only with those of its subsystems
         chosen = list({part.name: part for goal in chosen for part in goal.inner_first()}.values())
     prefixes = tuple(f"{goal.name}." for goal in chosen)
     every = (task.obligation for task in all_tasks(composition))
@@ -143,7 +143,7 @@ _COLOURS = {"proved": "green", "justified": "cyan", "unknown": "yellow", "refute
 
 
 def _shown(counterexample: Counterexample) -> str:
-    """A line for each step of a run, or the values alone."""
+    """A line for each step of a run, or only the values."""
     if not counterexample.trace:
         return counterexample.text()
     steps = (", ".join(f"{name} = {value}" for name, value in step) for step in counterexample.trace)

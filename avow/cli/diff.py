@@ -77,7 +77,7 @@ def _tell(changes: list[Change]) -> None:
 
 
 def _write(page: Path, old: str, new: str | None, changes: list[tuple[str, Change]]) -> None:
-    """Raises Rejected where the page cannot be written."""
+    """Raises Rejected if the page cannot be written."""
     from avow.report.comparison import render_comparison
 
     text = render_comparison(old, new or "the workspace as it is", changes)
@@ -90,14 +90,14 @@ def _write(page: Path, old: str, new: str | None, changes: list[tuple[str, Chang
 def _pair(old: str, new: str | None) -> Iterator[tuple[str, Snapshot, Snapshot]]:
     """(system, before, after) for every system that either side has. Raises Rejected."""
     before, after = _snapshots(old), _snapshots(new)
-    if len(before) == len(after) == 1:  # two reports of one system may stand under different names
+    if len(before) == len(after) == 1:  # two reports of one system may have different names
         (name, one), (_, other) = next(iter(before.items())), next(iter(after.items()))
         yield name, one, other
         return
     nothing = Snapshot("", {}, {})
     for name in dict.fromkeys((*before, *after)):
         if Path(old).exists() and name not in before:
-            continue  # one report or ledger against all of the workspace: only its own system is meant
+            continue  # one report or ledger compared with the whole workspace: only its own system counts
         yield name, before.get(name, nothing), after.get(name, nothing)
 
 
@@ -124,8 +124,8 @@ def _snapshots(name: str | None) -> dict[str, Snapshot]:
 
 
 def _of_signatures(path: Path) -> dict[str, Snapshot]:
-    """Of ``signed/``, or a system's folder in it, the newest signatures that count; or of a file there. Raises
-    Rejected."""
+    """The snapshots of the newest valid signatures in ``signed/`` or a system's folder in it, or of a file there.
+    Raises Rejected."""
     path = path.resolve()
     if path.is_file() and path.parent.parent.name == "signed":
         read = {path.parent.name: read_signed(path)}

@@ -1,4 +1,4 @@
-"""``avow doctor``: which tools are here, and whether they work."""
+"""``avow doctor``: which tools are installed, and whether they work."""
 
 from __future__ import annotations
 

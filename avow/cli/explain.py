@@ -1,4 +1,4 @@
-"""``avow explain``: one obligation, and everything that is known of it."""
+"""``avow explain``: one obligation, and everything that is known about it."""
 
 from __future__ import annotations
 
@@ -97,7 +97,7 @@ def _show(
 
 
 def _held_against_ledgers(place: Workspace, cases: Sequence[Case]) -> tuple[dict[str, list[str]], list[Diagnostic]]:
-    """System → why its report is stale, where its ledger can be read; what is wrong where it cannot."""
+    """System → why its report is stale, if its ledger can be read; the diagnostics of unreadable ledgers."""
     wrong: dict[str, list[str]] = {}
     faults: list[Diagnostic] = []
     for case in cases:
@@ -111,7 +111,7 @@ def _held_against_ledgers(place: Workspace, cases: Sequence[Case]) -> tuple[dict
 
 
 def _others(cases: Sequence[Case], name: str) -> list[tuple[str, str, list[str]]]:
-    """(system, heading, lines) of what is no obligation; a word is told once."""
+    """(system, heading, lines) of names that are not obligations; a word is shown once."""
     found: dict[tuple[str, ...], tuple[str, str, list[str]]] = {}
     for case in cases:
         for title, lines in explained(case, name):
@@ -121,9 +121,9 @@ def _others(cases: Sequence[Case], name: str) -> list[tuple[str, str, list[str]]
 
 
 def _left_out(place: Workspace, cases: Sequence[Case], name: str) -> Iterator[tuple[str, str, list[str]]]:
-    """As `_others`, of records that stand in the ledger alone."""
+    """As `_others`, for records that are only in the ledger."""
     for case in cases:
-        with contextlib.suppress(OSError):  # what cannot be read has no record to show: `avow audit` says so
+        with contextlib.suppress(OSError):  # an unreadable ledger has no record to show: `avow audit` reports it
             for title, lines in left_out(case, Ledger(place.ledger(case.system)).records(), name):
                 yield case.system, title, lines
 
@@ -133,7 +133,7 @@ def _id(obligation: dict[str, str]) -> str:
 
 
 def _reported_cases(place: Workspace) -> tuple[Case, ...]:
-    """Every report in the workspace that can be read, concluded as of today. Raises Rejected where there is none."""
+    """Every report in the workspace that can be read, concluded as of today. Raises Rejected if there is none."""
     files = sorted(place.reports.glob("*/report.json")) if place.reports.is_dir() else []
     if not files:
         raise Rejected(Diagnostic("REPORT001", f"no report under {place.reports}", hint="run `avow verify` first"))
@@ -142,7 +142,7 @@ def _reported_cases(place: Workspace) -> tuple[Case, ...]:
     for file in files:
         try:
             found.append(as_of(read_case(file), today()))
-        except Rejected as rejected:  # of an older version: no reason not to speak of the others
+        except Rejected as rejected:  # of an older version: the others are still shown
             faults += rejected.diagnostics
         except (ValueError, KeyError, OverflowError) as error:
             faults.append(Diagnostic("REPORT002", f"{file} cannot be concluded again: {error}"))
@@ -152,7 +152,7 @@ def _reported_cases(place: Workspace) -> tuple[Case, ...]:
 
 
 def _unreported(place: Workspace, cases: Sequence[Case]) -> tuple[str, ...]:
-    """Systems of the workspace of which there is no report that can be read."""
+    """Systems of the workspace without a readable report."""
     folders = sorted(f.name for f in place.contracts.iterdir() if f.is_dir()) if place.contracts.is_dir() else []
     return tuple(name for name in folders if name not in {case.system for case in cases})
 
@@ -160,9 +160,9 @@ def _unreported(place: Workspace, cases: Sequence[Case]) -> tuple[str, ...]:
 def find_claim(
     cases: Sequence[Case], wanted: str, without_report: Sequence[str] = ()
 ) -> tuple[tuple[Case, ObligationView], ...]:
-    """The obligations that a name means: a whole id, one without the system, ``agent.low``, or the end of one.
+    """The obligations with a name: a whole id, one without the system, ``agent.low``, or the end of one.
 
-    Raises Rejected where nothing is called so. `without_report`: systems of which nothing can be known here.
+    Raises Rejected if there is none. `without_report`: systems without a report.
     """
     named = [(case, view) for case in cases for view in case.obligations]
     for test in (
@@ -190,7 +190,7 @@ def find_claim(
 
 
 def _names(case: Case) -> Iterator[str]:
-    """Names in a case that are no obligations'."""
+    """The names in a case other than obligations'."""
     yield case.system
     yield from (node.name for node in case.nodes)
     yield from (r.id for r in case.requirements)

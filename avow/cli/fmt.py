@@ -63,7 +63,7 @@ def command(paths: tuple[Path, ...], check: bool, diff: bool, as_json: bool) -> 
             if not as_json:
                 click.echo(f"{printable(str(path))} is not in the canonical layout")
         elif str(path) != "-":
-            target = path.resolve()  # through a symbolic link, not in its place
+            target = path.resolve()  # follow a symbolic link, do not replace it
             mode = target.stat().st_mode
             if not mode & stat.S_IWUSR:
                 faults.append(Diagnostic("RCL002", f"{path} is read-only and stays as it is"))

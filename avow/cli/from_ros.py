@@ -1,4 +1,4 @@
-"""``avow init --from-bag`` and ``--from-graph``: a system drafted from what was recorded, or from what runs."""
+"""``avow init --from-bag`` and ``--from-graph``: a system drafted from a recording, or from a running graph."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _DOMAIN = re.compile(r"((?:dds|ros2)(?::\d+)?)(?:@([\w.:-]+))?\Z")
 
 
 def draft_system(bag: Path | None, graph: str | None, distro: str | None, folder: Path) -> None:
-    """Write the system's folder. Raises Rejected for what cannot be read; nothing is written then."""
+    """Write the system's folder. Raises Rejected if something cannot be read; nothing is written then."""
     known, wrong = definitions((), distro)
     if wrong:
         raise Rejected(*wrong)
@@ -100,14 +100,14 @@ def _listing(graph: str) -> Listing:
         if len(data) > ROS_GRAPH_BYTES:
             raise NoListing(f"it has more than {ROS_GRAPH_BYTES} bytes")
         return parse_listing(data.decode("utf-8"))
-    except (NoListing, ValueError) as no:  # also of text that is not UTF-8
+    except (NoListing, ValueError) as no:  # also for text that is not UTF-8
         raise Rejected(Diagnostic("CLI011", f"{graph}: {no}")) from None
     except OSError as error:
         raise Rejected(Diagnostic("CLI011", f"{graph} cannot be read: {error.strerror or error}")) from None
 
 
 def _names_in(event: Event) -> set[str]:
-    """The node that a message of ROS's own log or of its parameters names."""
+    """The node that a message of ROS's own log or parameter events names."""
     match event:
         case {"topic": "/rosout", "name": str(name)} if name:
             return {f"/{name.strip('/').replace('.', '/')}"}
@@ -117,8 +117,8 @@ def _names_in(event: Event) -> set[str]:
 
 
 def _together(listing: Listing | None, found: Carried, heard: set[str]) -> tuple[Listing, frozenset[str]]:
-    """What a bag says of who publishes, beside what a graph does, and the nodes of which neither says so: these follow
-    from the topics' names."""
+    """The publishers in a bag and in a graph together, and the nodes for which neither has publishers: these are
+    derived from the topics' names."""
     nodes = listing.nodes if listing is not None else ()
     known = {topic for node in nodes for topic in node.publishes}
     callers: dict[str, list[str]] = {}
@@ -137,7 +137,7 @@ def _together(listing: Listing | None, found: Carried, heard: set[str]) -> tuple
 
 
 def _own_types(listing: Listing, known: Definitions, base: Definitions) -> dict[str, str]:
-    """The definitions that a bag alone has, of what the topics carry: they are needed where the bag is not."""
+    """The definitions of the topics' types that only the bag has: they are needed where the bag is missing."""
     kinds = (known.get(kind) for topic, kind in listing.types.items() if not is_plumbing(topic) and not is_part(topic))
     wanted = {name for kind in kinds if kind is not None for name in (kind.name, *known.within(kind))}
     found = ((name, known.get(name)) for name in sorted(wanted - base.messages.keys()))
@@ -145,12 +145,12 @@ def _own_types(listing: Listing, known: Definitions, base: Definitions) -> dict[
 
 
 def _asks(topic: str) -> bool:
-    """Whether a topic is the part of calls that their server hears."""
+    """Whether a topic is the part of a call that the server receives."""
     return is_part(topic) and topic.endswith(("/_request", "/_goal"))
 
 
 def _sound(listing: Listing) -> Listing:
-    """Without names and types that ROS would not take: they come from a file."""
+    """The listing without names and types that ROS would reject: they come from a file."""
 
     def kept(names: tuple[str, ...]) -> tuple[str, ...]:
         return tuple(name for name in dict.fromkeys(names) if name.startswith("/") and is_name(name))

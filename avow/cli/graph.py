@@ -1,4 +1,4 @@
-"""``avow graph``: how a system is wired: nodes, topics, types, and what is the environment's."""
+"""``avow graph``: how a system is wired: nodes, topics, types, and the environment's inputs."""
 
 from __future__ import annotations
 

@@ -112,7 +112,7 @@ def _from_template(directory: Path, template: str) -> None:
 
 
 def _workspace(directory: Path) -> None:
-    """What every workspace has."""
+    """The files of every workspace."""
     ignored = Path(str(resources.files("avow.cli") / "template/gitignore.txt"))
     write(directory / ".gitignore", ignored.read_bytes())
     write(directory / "dodo.py", _DODO)

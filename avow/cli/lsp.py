@@ -33,8 +33,8 @@ def standing(file: str) -> StatusLookup:
     """The latest verdict of each method on each guarantee of the system that the file belongs to: shown when hovering
     over them.
 
-    What the ledger holds may be about an older text: finding that out takes more than an editor waits for, so the
-    answer says when the verdict was given. Files outside a workspace have no status.
+    The ledger's verdicts may be about an older text: checking that takes too long for an editor, so the answer contains
+    the time of the verdict. Files outside a workspace have no status.
     """
     path = Path(file).resolve()
     workspace = find_workspace(path.parent)

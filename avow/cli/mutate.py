@@ -1,4 +1,4 @@
-"""``avow mutate``: would the evidence notice if the contract said something else?"""
+"""``avow mutate``: would the evidence change if the contract were different?"""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def command(
             raise click.UsageError(f"no {what} of the plan is called '{name}'; known: {', '.join(sorted(known))}")
     works = tuple(w for w in every if method in (None, w.method) and (not nodes or w.node in nodes))
     scores: list[Score] = []
-    for score in hunt(place, works, new_run(), limit, jobs):  # minutes may lie between two of them
+    for score in hunt(place, works, new_run(), limit, jobs):  # minutes may pass between two of them
         scores.append(score)
         if not as_json:
             _tell(score)
@@ -62,7 +62,7 @@ def command(
         click.echo("no current evidence to examine: run `doit verify` first")
     if not scores:
         return 0
-    # the report is rendered again; where the answer is JSON, its lines are not for standard output
+    # the report is rendered again; with JSON, its lines must not go to standard output
     answer = io.StringIO() if as_json else None
     return execute(place.root, [f"report:{surveyed.system.name}"], answer=answer) or (1 if hollow else 0)
 

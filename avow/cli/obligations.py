@@ -43,7 +43,7 @@ def command(name: str, as_json: bool) -> int:
 
 
 def _listings(place: Workspace, name: str) -> Iterator[Listing]:
-    """What is asked for: of each system, or of a node in each system that has it. Raises Rejected."""
+    """The requested listings: of each system, or of a node in each system that has it. Raises Rejected."""
     folders: dict[str, Path] = {folder.name: folder for folder in place.systems()}
     system, slash, node = name.partition("/")
     if not slash and system not in folders:

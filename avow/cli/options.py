@@ -1,4 +1,4 @@
-"""What is the same in every command: paths, how a system is named, `--json`, `--seconds`, `--seed`."""
+"""Parts that are the same in every command: paths, names of systems, `--json`, `--seconds`, `--seed`."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class PathArgument(click.Path):
 class ContractArgument(PathArgument):
     """An .rcl file, a system's folder or plan.yaml, or the name of a system in this workspace; gives its path.
 
-    What is neither there nor a system's name stays as it was written, for the command to refuse.
+    A text that is neither an existing path nor a system's name is kept as written, for the command to reject.
     """
 
     def convert(
@@ -79,7 +79,7 @@ def has_nodes(contract: Contract, wanted: Iterable[str]) -> None:
 
 
 class _Seconds(click.ParamType[float]):
-    """A time above 0 and of at most a day; `nan` and `inf` are numbers to Python, not times."""
+    """A time above 0 and of at most a day; `nan` and `inf`, which Python accepts as numbers, are rejected."""
 
     name = "seconds"
 
@@ -94,8 +94,8 @@ class _Seconds(click.ParamType[float]):
 
 
 def seconds_option(default: float | None = None) -> Callable[[Command], Command]:
-    """``--seconds``: the effort for one question to the solver, as the time that it usually takes. Without a default
-    the plan has times of its own: given, it stands in place of them."""
+    """``--seconds``: the effort for one solver query, as the time that it usually takes. Without a default, the plan's
+    times apply unless the option is given."""
     text = "Effort for one question to the solver, as the time that it usually takes; what is counted is steps."
     if default is None:
         text = "Effort for one question to the solver, and time for one run of a tool, whatever the plan says."
@@ -105,7 +105,7 @@ def seconds_option(default: float | None = None) -> Callable[[Command], Command]
 
 
 def seed_option() -> Callable[[Command], Command]:
-    """``--seed``: where random choices start."""
+    """``--seed``: the seed of random choices."""
     return click.option(
         "--seed",
         default=0,
@@ -116,7 +116,7 @@ def seed_option() -> Callable[[Command], Command]:
 
 
 def json_option(what: str = "") -> Callable[[Command], Command]:
-    """``--json``: the answer as data on standard output; what else there is to say goes to standard error."""
+    """``--json``: the answer as data on standard output; all other messages go to standard error."""
     text = "For machines" + (f": {what}." if what else ".")
     return click.option("--json", "as_json", is_flag=True, help=text)
 

@@ -1,4 +1,4 @@
-"""``avow recheck``: the kernel alone, over the certificates that the last runs left."""
+"""``avow recheck``: only the kernel, over the certificates of the last runs."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class _Requirement(Foreign):
 
 @dataclass(frozen=True, slots=True)
 class _Report(Foreign):
-    """What of a report is of interest here."""
+    """The parts of a report that are used here."""
 
     kernel: _Kernel
     requirements: tuple[_Requirement, ...] = ()
@@ -54,7 +54,7 @@ class Unfounded:
 
 @dataclass(frozen=True, slots=True)
 class Founded:
-    """By so many solvers, on so many hypotheses."""
+    """An established claim, with the number of solvers and of hypotheses."""
 
     scope: str
     claim: str

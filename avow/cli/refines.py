@@ -1,4 +1,4 @@
-"""``avow refines``: may one contract stand in for another?"""
+"""``avow refines``: may one contract replace another?"""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def command(
 
 
 def _nodes(path: Path, bounds: Bounds) -> tuple[tuple[Node, ...], Verdict]:
-    """The nodes to compare, and whether they may be relied on: a derived contract only if its derivation stands."""
+    """The nodes to compare, and whether they may be relied on: a derived contract only if its derivation is proved."""
     if not path.is_dir():
         return load_contract([path]).nodes, Verdict.PROVED
     composition = compose(load_system(path))
@@ -80,7 +80,7 @@ def _nodes(path: Path, bounds: Bounds) -> tuple[tuple[Node, ...], Verdict]:
 def _pairs(
     new: tuple[Node, ...], old: tuple[Node, ...], asked: str | None, concrete: Path, abstract: Path
 ) -> tuple[list[tuple[Node, Node]], list[str]]:
-    """What is compared with what, and what of ABSTRACT has no counterpart. Raises Rejected."""
+    """The pairs of nodes to compare, and the nodes of ABSTRACT without a counterpart. Raises Rejected."""
     if asked is not None:
         mine, _, theirs = asked.partition("=") if "=" in asked else (asked, "", asked)
         for name, nodes, path in ((mine, new, concrete), (theirs, old, abstract)):

@@ -1,4 +1,4 @@
-"""``avow requirements``: requirements of another tool as the section of a plan."""
+"""``avow requirements``: requirements of another tool as a section of a plan."""
 
 from __future__ import annotations
 

@@ -110,7 +110,7 @@ def _listing(results: list[SanityResult], everything: bool) -> None:
 
 
 def _free(result: SanityResult) -> bool:
-    """Whether it says only that an output is the implementation's to choose."""
+    """Whether the result is only that an output is left to the implementation."""
     return result.asked.about is Property.DETERMINED and result.verdict == "refuted" and not result.because
 
 
@@ -121,6 +121,6 @@ def _style(result: SanityResult) -> str:
 
 
 def _examples(result: SanityResult) -> list[Counterexample]:
-    if result.counterexample is None:  # what contradicts itself does so for every input, and the explanation has it all
+    if result.counterexample is None:  # a contradiction holds for every input, and the explanation is complete
         return []
     return [example for _, example in result.conflicts] or [result.counterexample]

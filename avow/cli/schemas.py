@@ -1,4 +1,4 @@
-"""The published JSON schemas that follow from dataclasses: of reports, ledgers, and what commands write for machines.
+"""The published JSON schemas that follow from dataclasses: of reports, ledgers, and the commands' output for machines.
 
 python -m avow.cli.schemas docs/schemas
 """
@@ -20,7 +20,7 @@ _PLACE = "https://avow.example/schemas/"
 
 
 def schemas() -> dict[str, dict[str, Any]]:
-    """The schemas by the names of their files."""
+    """The schemas by their file names."""
     return {
         "case": case_schema(),
         "evidence": evidence_schema(),

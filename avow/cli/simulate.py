@@ -41,7 +41,7 @@ def command(path: Path, seed: int, steps: int | None, seconds: float, as_json: b
         scenario = loaded.plan.scenario
         length = steps or (scenario.steps if scenario else None) or 20
         walk = machine.walk(Random(seed), length)
-        for again in range(1, WALKS if machine.cells else 1):  # an answer may leave a memory that no answer suits
+        for again in range(1, WALKS if machine.cells else 1):  # an answer may lead to a memory without allowed answers
             if walk.stuck is None:
                 break
             other = machine.walk(Random(seed + again), length)

@@ -26,8 +26,8 @@ NOTATIONS = {
     "smtlib": "avow.solving.smtlib",
     "fretish": "avow.fretish.writing",
 }
-"""Notation → the module with its function ``to_<notation>(contract)``, imported when it is asked for: it gives a text,
-or (`avow.language.contract.Partial`) a text and what is left out. Further notations are those of the backends
+"""Notation → the module with its function ``to_<notation>(contract)``, imported on demand: it gives a text, or
+(`avow.language.contract.Partial`) a text and the omissions. Further notations are those of the backends
 (`avow.backend_kit.protocol.Backend`)."""
 
 
@@ -108,8 +108,8 @@ def _only(contract: Contract, nodes: tuple[str, ...]) -> Contract:
 
 
 def _folder(node: str, system: System) -> str:
-    """A folder's name for a node: names of RCL are safe file names but for their primes, and case may not tell two
-    apart."""
+    """A folder's name for a node: names of RCL are safe file names except for their primes, and case may not
+    distinguish two."""
     folded = [other.name for other in system.contract.nodes if other.name.casefold() == node.casefold()]
     return node if len(folded) == 1 else f"{node}_{folded.index(node) + 1}"
 

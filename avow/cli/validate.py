@@ -1,4 +1,4 @@
-"""``avow validate``: a person reads requirements' sentences against their formulas, and the plan says so."""
+"""``avow validate``: a person compares requirements' sentences with their formulas, and the plan records it."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def command(system: str, requirements: tuple[str, ...], who: str, as_json: bool)
 
 
 def _said(system: System, requirement: Requirement) -> dict[str, object]:
-    """A requirement's sentence, and what has to say the same."""
+    """A requirement's sentence, and the formula or guarantees that must have the same meaning."""
     support: dict[str, str] = {}
     for name in requirement.supported_by if not requirement.formula and not requirement.temporal else ():
         node, _, clause = name.partition(".")

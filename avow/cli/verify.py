@@ -1,4 +1,4 @@
-"""``avow verify``: the same as ``doit verify``, and what doit's command line cannot say."""
+"""``avow verify``: the same as ``doit verify``, with options that doit's command line cannot have."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def command(
 
 
 def _cluster(address: str) -> tuple[Cluster, Remote]:
-    """Raises Rejected where there is none, or none that could do anything."""
+    """Raises Rejected if there is no cluster, or no usable one."""
     from avow.pipeline.cluster import Address, Cluster
     from avow.pipeline.remote import remote
     from avow.pipeline.settings import ON

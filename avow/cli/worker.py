@@ -1,4 +1,4 @@
-"""``avow worker``: do works for `avow verify --on` of other machines."""
+"""``avow worker``: execute jobs for `avow verify --on` of other machines."""
 
 from __future__ import annotations
 
