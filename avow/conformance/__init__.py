@@ -1,4 +1,4 @@
-"""The tests that every verification backend has to pass: for pytest, and for third parties' backends as for our own.
+"""The pytest suite that every verification backend has to pass, third parties' backends as well as our own.
 
 A test file names the backend and seeds it with contracts whose verdicts are known:
 
@@ -8,8 +8,8 @@ A test file names the backend and seeds it with contracts whose verdicts are kno
         backend = BACKEND
         seeded = (Seeded("heads", CONTRACT, {"heads": True}, {"same": Verdict.TESTED}), …)
 
-`avow.conformance.suite` says what is tested, `avow.conformance.seeded` what a seeded case is, and
-`avow.conformance.plugin` is what pytest loads. See `docs/developers/adding-a-backend.md`.
+`avow.conformance.suite` contains the tests, `avow.conformance.seeded` defines seeded cases, and
+`avow.conformance.plugin` is the pytest plugin. See `docs/developers/adding-a-backend.md`.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ __all__ = ["Conformance", "Seeded"]
 
 
 def __getattr__(name: str) -> Any:
-    """The two names are imported when asked for: pytest loads the plugin in every environment that has Avow."""
+    """The two names are imported on demand: pytest loads the plugin in every environment that has Avow."""
     if name not in __all__:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     import pytest

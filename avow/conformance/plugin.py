@@ -1,7 +1,7 @@
-"""What pytest loads where Avow is installed: the marker `conformance`, and `--avow-backend NAME`.
+"""The pytest plugin of an installed Avow: the marker `conformance`, and `--avow-backend NAME`.
 
 With the option only the suites of these backends run, and a backend without a suite is an error: a run that tested
-nothing is no success. Nothing else of a session changes, and nothing of Avow is imported before it is needed.
+nothing must not succeed. Nothing else in a session changes, and Avow is imported only when it is needed.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def pytest_report_header(config: pytest.Config) -> list[str]:
-    """The backends asked for, and the tools that are here: what is missing is skipped, or `not-run`."""
+    """The requested backends, with the classes that provide them."""
     if not config.getoption("avow_backend"):
         return []
     from avow.backend_kit.registry import installed
@@ -69,7 +69,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: pytest.Config) -> None:
-    """Which tools of the backends asked for were there."""
+    """The available and missing tools of the requested backends."""
     for backend in config.stash.get(_ASKED, ()):
         for tool in backend.tools():
             state = tool.version or "is here" if tool.present else f"is missing: {tool.install}"
@@ -77,8 +77,8 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: p
 
 
 def _backend(item: pytest.Item) -> Backend | None:
-    """The backend of the suite that the test belongs to. None elsewhere."""
-    suite = sys.modules.get("avow.conformance.suite")  # where it was not imported nothing inherits from it
+    """The backend of the suite that the test belongs to. None for other tests."""
+    suite = sys.modules.get("avow.conformance.suite")  # if it was not imported, nothing inherits from it
     cls = getattr(item, "cls", None)
     if suite is None or cls is None or not issubclass(cls, suite.Conformance):
         return None

@@ -1,4 +1,4 @@
-"""A seeded case: a contract and what the plan gives the method, with the verdicts that are right for them."""
+"""A seeded case: a contract and the method's part of the plan, with the correct verdicts."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from avow.system.load import load_system
 
 @dataclass(frozen=True, slots=True)
 class Seeded:
-    """One node, one method, and what is to come out."""
+    """One node, one method, and the expected verdicts."""
 
     name: str
     contract: str
@@ -30,7 +30,7 @@ class Seeded:
     options: Any
     """The method's options, as in plan.yaml."""
     verdicts: Mapping[str, Verdict]
-    """Guarantee → the verdict that is right for it. A guarantee left out is not given to the method."""
+    """Guarantee → its correct verdict. A guarantee left out is not given to the method."""
     files: Mapping[str, str] = field(default_factory=dict)
     """Path in the system's folder → text: programs, data, mappings. The answer depends on each of them."""
     plan: Mapping[str, Any] = field(default_factory=dict)
@@ -38,7 +38,7 @@ class Seeded:
     declared: Mapping[str, Any] = field(default_factory=dict)
     """More of the node's entry in plan.yaml: its source, numbers and memory."""
     prepare: Callable[[Path], None] | None = None
-    """Called with the system's folder when all is written: for what is made from the rest, such as digests."""
+    """Called with the system's folder when all is written: for files made from the others, such as digests."""
 
     @property
     def node(self) -> str:
@@ -47,7 +47,7 @@ class Seeded:
         return found[1]
 
     def written(self, backend: Backend, folder: Path) -> Job:
-        """The case as a system's folder, read back. Raises Rejected where contract or plan are at fault."""
+        """The case as a system's folder, read back. Raises Rejected if contract or plan have errors."""
         for name, text in self.files.items():
             write(folder / name, text)
         write(folder / "system.rcl", self.contract)
@@ -64,7 +64,8 @@ class Seeded:
         return method_job(system, system.contract.node(self.node), method, backend)
 
     def renamed(self, words: Mapping[str, str]) -> Seeded:
-        """With names replaced wherever they stand as words: in the contract, the options, the files and the plan."""
+        """The case with names replaced wherever they occur as words: in the contract, the options, the files and the
+        plan."""
         if not words:
             return self
         word = re.compile(r"(?<![\w'])(" + "|".join(map(re.escape, words)) + r")(?![\w'])")
@@ -80,7 +81,7 @@ class Seeded:
                     return {value(k): value(v) for k, v in old.items()}
                 case list() | tuple():
                     return [value(item) for item in old]
-                case _:  # nothing in it to change
+                case _:  # it contains no names
                     return old
 
         return replace(
@@ -95,7 +96,7 @@ class Seeded:
 
 
 def settle(backend: Backend, job: Job, folder: Path, limits: Limits) -> Report:
-    """Export and discharge, as the pipeline does both: it reads the report from a process of its own."""
+    """Export and discharge as in the pipeline, which reads the report from another process."""
     for name, text in one_step.export(backend, job).items():
         write(folder / name, text)
     folder.mkdir(parents=True, exist_ok=True)
@@ -104,7 +105,7 @@ def settle(backend: Backend, job: Job, folder: Path, limits: Limits) -> Report:
 
 
 def verdicts(job: Job, report: Report) -> dict[str, Verdict]:
-    """Guarantee → verdict. Fails where an obligation has no outcome, or several."""
+    """Guarantee → verdict. Fails if an obligation has no outcome, or several."""
     names = {o.id: o.name for o in job.every}
     answered = [outcome.obligation for outcome in report.outcomes]
     assert sorted(answered) == sorted(names), f"one outcome for each obligation, not {answered} for {sorted(names)}"

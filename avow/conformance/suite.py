@@ -31,16 +31,16 @@ from avow.solving.smtlib import CVC5
 from avow.system.plan import System
 
 _HOSTILE = ("class", "ensures", "lambda", "None", "self", "exit", "con", "x" * 120)
-"""Names that are plain words of the contract language, and something else to a tool, a file system or Python."""
+"""Names that are ordinary in the contract language, but special for a tool, a file system or Python."""
 
 _ODD_VALUES: tuple[Any, ...] = (None, True, -1, 10**30, 1.5, "", "nowhere", "../../../etc/passwd", [], {}, [[]])
-"""Options that somebody's slip may give; most are of a wrong type for any option."""
+"""Values that a typing error may give to options; most have a wrong type for any option."""
 
 _FOLDER = 'it\'s; $(touch broken) "a b" µ'
-"""A system's folder that is a trap for whoever pastes paths into commands."""
+"""A folder name that breaks code which pastes paths into commands."""
 
 _LIES = (None, "", "exit 1", "kill -9 $$", "head -c 100000 /dev/zero", "echo unsat; echo 0 errors")
-"""What stands under the tools' names: nothing at all, or a script that does this."""
+"""The replacements of the tools: none, or a script with this content."""
 
 _ENOUGH = Limits(seconds=120.0)
 _HARDLY = Limits(seconds=0.05)
@@ -52,15 +52,15 @@ class Conformance:
     backend: ClassVar[Backend]
     seeded: ClassVar[tuple[Seeded, ...]]
     """Contracts with known verdicts. At least one claim must be supported, and one refuted (or, by `never_refutes`,
-    not supported): a method that says the same of everything shows nothing."""
+    not supported): a method with the same verdict for everything shows nothing."""
     never_refutes: ClassVar[bool] = False
-    """The method cannot show that a claim is false: what it does not support is `unknown`."""
+    """The method cannot show that a claim is false: a claim that it does not support is `unknown`."""
     files_name_the_node: ClassVar[bool] = False
-    """The seeded files contain names that are made of the node's: it keeps its name then."""
+    """The seeded files contain names derived from the node's: the node then keeps its name."""
 
     asks_inputs: ClassVar[bool] = True
-    """What is verified is asked for inputs of the contract's, on which its assumptions can be judged; measurements of
-    whole runs, and a model with an environment of its own, are not."""
+    """The program under test is run on inputs of the contract, on which its assumptions can be judged; this is false
+    for measurements of whole runs, and for a model with an environment of its own."""
 
     def pytest_generate_tests(self, metafunc: pytest.Metafunc) -> None:
         if "case" in metafunc.fixturenames:
@@ -73,10 +73,10 @@ class Conformance:
     def job(self, case: Seeded, tmp_path: Path) -> Job:
         return case.written(self.backend, tmp_path / "system")
 
-    # -- what it says of itself ----------------------------------------------------------------------------------------
+    # -- declarations --------------------------------------------------------------------------------------------------
 
     def test_it_keeps_the_promise(self) -> None:
-        """All attributes are there, of the right types, and say something."""
+        """All attributes exist, have the right types, and are not empty."""
         assert lacks(self.backend) == ""
         assert self.backend.strength.supports, "strength is the best verdict, one that supports a claim"
         for name in ("name", "title", "version", "green_means"):
@@ -85,8 +85,8 @@ class Conformance:
         assert self.backend.name.replace("_", "").replace("-", "").isalnum()
 
     def test_the_schema_is_one(self, case: Seeded) -> None:
-        """`options_schema` is JSON schema, leaves the pipeline's own options alone, takes the seeded options, and
-        refuses one that nobody declared: a slip in its name would go unnoticed."""
+        """`options_schema` is JSON schema, leaves the pipeline's own options alone, accepts the seeded options, and
+        rejects an undeclared one: otherwise a typing error in a name would not be found."""
         jsonschema.Draft202012Validator.check_schema(self.backend.options_schema)
         common = COMMON_OPTIONS & set(self.backend.options_schema.get("properties", {}))
         assert not common, f"these are options of every method: {sorted(common)}"
@@ -104,7 +104,7 @@ class Conformance:
             assert code.explanation, name
 
     def test_tools_are_found_without_an_exception(self, monkeypatch: pytest.MonkeyPatch) -> None:
-        """With and without them; a missing tool says how to install it."""
+        """A missing tool has instructions to install it."""
         monkeypatch.setenv("PATH", os.devnull)
         self.forget_tools()
         try:
@@ -122,8 +122,7 @@ class Conformance:
     # -- verdicts ------------------------------------------------------------------------------------------------------
 
     def test_seeded_verdicts(self, case: Seeded, job: Job, tmp_path: Path) -> None:
-        """Each claim gets the verdict that is right for it, twice; a refutation says why; the system's folder is
-        untouched."""
+        """Each claim gets its correct verdict, twice; a refutation has a reason; the system's folder is unchanged."""
         errors = [d for d in self.backend.check(job) if d.is_error]
         assert not any(v.supports for v in case.verdicts.values()) or not errors, errors
         before = _tree(job.root)
@@ -142,7 +141,7 @@ class Conformance:
         assert verdicts(job, settle(self.backend, job, tmp_path / "again", _ENOUGH)) == found
 
     def is_sound(self, outcome: Outcome) -> None:
-        """What holds of any outcome."""
+        """The conditions on every outcome."""
         assert outcome.summary.strip(), f"{outcome.verdict} without a word"
         assert "Traceback" not in outcome.summary
         if outcome.verdict is Verdict.REFUTED:
@@ -154,7 +153,7 @@ class Conformance:
             assert outcome.bound, "an answer within bounds names them"
 
     def test_one_obligation_at_a_time(self, case: Seeded, job: Job, tmp_path: Path) -> None:
-        """A part of the obligations gets the verdicts that it gets among all, and none is answered unasked."""
+        """A subset of the obligations gets the same verdicts as in the whole set, and no others are answered."""
         assert self.backend.discharge(replace(job, obligations=(), claims=()), tmp_path, _ENOUGH).outcomes == ()
         for k, obligation in enumerate(job.obligations):
             one = replace(job, obligations=(obligation,))
@@ -164,7 +163,7 @@ class Conformance:
     # -- export --------------------------------------------------------------------------------------------------------
 
     def test_export_is_pure(self, job: Job, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-        """Same job, same bytes, wherever and whenever; names stay in the folder; nothing is written."""
+        """Same job, same bytes, at any place and time; names stay in the folder; nothing is written."""
         before = _tree(job.root)
         once = dict(self.backend.export(job))
         monkeypatch.chdir(tmp_path)
@@ -178,7 +177,7 @@ class Conformance:
             assert str(job.root) not in text, f"{name} holds this machine's paths"
 
     def test_outside_checks(self, job: Job, tmp_path: Path) -> None:
-        """Each names a file that is there, and guarantees that the method takes on."""
+        """Each names an existing file, and guarantees of the method."""
         files = self.backend.export(job)
         for name, text in files.items():
             write(tmp_path / name, text)
@@ -188,7 +187,7 @@ class Conformance:
             assert set(check.guarantees) <= set(job.method.guarantees)
 
     def test_translations(self, job: Job) -> None:
-        """Every notation says something or what it lacks; input at fault is Rejected, with a place or a reason."""
+        """Every notation gives files or what is missing; bad input is Rejected, with a place or a reason."""
         for notation, words in self.backend.translations.items():
             assert words.strip()
             try:
@@ -201,7 +200,7 @@ class Conformance:
             self.codes_are_known(made.missing)
 
     def test_other_steps(self, case: Seeded, job: Job, tmp_path: Path) -> None:
-        """A clause that speaks of other steps is judged, or refused by name: here each demands what no step has."""
+        """A clause about other steps is judged, or rejected by name: here each demands something impossible."""
         never = Not(History(Past.ONCE, (TRUE,), BOOL))
         for where in ("guarantees", "assumptions"):
             node = job.node
@@ -224,7 +223,7 @@ class Conformance:
                     assert "once" in outcome.summary
 
     def test_only_what_is_assumed(self, case: Seeded, job: Job, tmp_path: Path) -> None:
-        """A counterexample meets what the node assumes: where nothing can, nothing is refuted."""
+        """A counterexample satisfies the node's assumptions: if nothing can, nothing is refuted."""
         if Verdict.REFUTED not in case.verdicts.values() or not self.asks_inputs:
             return
         nothing = Clause(ClauseKind.ASSUMPTION, "nothing", len(job.node.assumptions) + 1, Not(TRUE))
@@ -242,10 +241,10 @@ class Conformance:
     # -- hostile input -------------------------------------------------------------------------------------------------
 
     def test_hostile_names(self, case: Seeded, tmp_path: Path) -> None:
-        """A node and guarantees that are called like a tool's or Python's own words: the verdicts stay as they are."""
+        """A node and guarantees with names that are keywords of a tool or of Python: the verdicts do not change."""
         mine = _HOSTILE[self.seeded.index(case) % len(_HOSTILE) :] + _HOSTILE
         words = mine[: len(_HOSTILE) : min(2, len(self.seeded))]
-        for k in range(0, len(words), len(case.verdicts)):  # as many of them at once as there are claims
+        for k in range(0, len(words), len(case.verdicts)):  # as many of them at a time as there are claims
             some = words[k : k + len(case.verdicts)]
             node = {} if self.files_name_the_node else {case.node: f"{some[0]}_n"}
             other = case.renamed({**node, **dict(zip(case.verdicts, some, strict=False))})
@@ -254,7 +253,7 @@ class Conformance:
             assert found == dict(other.verdicts) or self.is_absent(found), some
 
     def test_a_hostile_folder(self, case: Seeded, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-        """Paths are data, also those that a shell would take for commands."""
+        """Paths are data, also those that a shell would run as commands."""
         monkeypatch.chdir(tmp_path)
         job = case.written(self.backend, tmp_path / _FOLDER)
         found = verdicts(job, settle(self.backend, job, tmp_path / "made", _ENOUGH))
@@ -262,8 +261,8 @@ class Conformance:
         assert not (tmp_path / "broken").exists()
 
     def test_hostile_options(self, case: Seeded, tmp_path: Path) -> None:
-        """Odd values that pass the schema, one after the other: what `check` refuses supports nothing, and neither
-        raises. (What does not pass the schema, the pipeline refuses.)"""
+        """Odd values that pass the schema, one after the other: a value that `check` rejects supports nothing, and
+        neither call raises. (The pipeline rejects values that do not pass the schema.)"""
         if not isinstance(case.options, Mapping):
             pytest.skip("the options are no mapping")
         for k, (key, value) in enumerate((key, value) for key in case.options for value in _ODD_VALUES):
@@ -273,14 +272,14 @@ class Conformance:
             odd = replace(case, options={**case.options, key: value})
             try:
                 job = odd.written(self.backend, folder)
-            except Rejected:  # YAML cannot say it, or the plan's reader refuses it already
+            except Rejected:  # YAML cannot express it, or the plan's reader rejects it already
                 continue
             schema = jsonschema.Draft202012Validator(self.backend.options_schema)
             if schema.is_valid(job.options) and any(d.is_error for d in self.backend.check(job)):
                 self.is_refused(job, folder / "made")
 
     def test_files_that_are_missing(self, case: Seeded, job: Job, tmp_path: Path) -> None:
-        """Without a file, and with a broken one, nothing is supported that rests on it, and nothing raises."""
+        """Without a file, and with a broken one, no claim that depends on it is supported, and nothing raises."""
         for name in case.files:
             kept = (job.root / name).read_bytes()
             for broken in (None, b"", b"\xff\xfe\x00\x01", b"(" * 5000):
@@ -296,7 +295,7 @@ class Conformance:
             assert path.is_absolute()
         try:
             report = settle(self.backend, job, folder, _ENOUGH)
-        except Rejected:  # of export: what check says
+        except Rejected:  # from export: the diagnostics of check
             report = self.backend.discharge(job, folder, _ENOUGH)
         for name, verdict in verdicts(job, report).items():
             assert not verdict.supports, f"{name} is {verdict} although the input is at fault"
@@ -310,7 +309,7 @@ class Conformance:
     # -- tools and time ------------------------------------------------------------------------------------------------
 
     def test_hardly_any_time(self, case: Seeded, job: Job, tmp_path: Path) -> None:
-        """It comes back soon, with a verdict for each claim: the right one, or one that says that it gave up."""
+        """It returns soon, with a verdict for each claim: the correct one, or one for giving up."""
         begun, children = time.monotonic(), _children()
         found = verdicts(job, settle(self.backend, job, tmp_path / "made", _HARDLY))
         assert time.monotonic() - begun < CONFORMANCE_PATIENCE
@@ -322,8 +321,8 @@ class Conformance:
     def test_tools_that_are_missing_or_lie(
         self, case: Seeded, job: Job, answer: str | None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        """Without its outside tools, or with others under their names, a claim is not supported that was not: no exit
-        code, and no silence, is an answer."""
+        """Without its outside tools, or with others under their names, no further claim is supported: neither an exit
+        code nor empty output is an answer."""
         outside = [Path(tool.path).name for tool in self.backend.tools() if tool.path]
         place = tmp_path / "bin"
         place.mkdir()
@@ -344,7 +343,7 @@ class Conformance:
                 assert not required, f"{required[0].name} is required, and was not there"
 
     def forget_tools(self) -> None:
-        """Called when the PATH changes. Override it where a backend remembers its tools by itself."""
+        """Called when the PATH changes. Override it if a backend caches its tools by itself."""
         find_tool.cache_clear()
 
     def is_absent(self, found: Mapping[str, Verdict]) -> bool:
@@ -353,7 +352,7 @@ class Conformance:
     # -- staleness -----------------------------------------------------------------------------------------------------
 
     def test_its_files_are_named(self, case: Seeded, job: Job) -> None:
-        """Every file that the answer depends on is in `files`, or a change of it would go unnoticed."""
+        """Every file that the answer depends on is in `files`; otherwise a change of it would not be noticed."""
         named = {path.resolve() for path in self.backend.files(job)}
         for path in named:
             assert path.is_relative_to(job.root.resolve()), f"{path} is outside the system's folder"
@@ -361,8 +360,8 @@ class Conformance:
             assert (job.root / name).resolve() in named, f"a change of {name} would go unnoticed"
 
     def test_what_it_says_not_to_look_at(self, case: Seeded, job: Job, tmp_path: Path) -> None:
-        """`uses_scenario`, `uses_steps` and `uses_wiring` are believed: where one is False, export and verdicts are the
-        same whatever stands there. What is looked at moves the key."""
+        """The pipeline relies on `uses_scenario`, `uses_steps` and `uses_wiring`: if one is False, export and verdicts
+        do not depend on that part; if it is True, that part changes the key."""
         whole = self.backend.export(job)
         found = verdicts(job, settle(self.backend, job, tmp_path / "made", _ENOUGH))
         for name, looked, system in _others(self.backend, job):
@@ -384,7 +383,7 @@ def _job_name(job: Job, outcome: Outcome) -> str:
 
 
 def _others(backend: Backend, job: Job) -> Iterator[tuple[str, bool, System]]:
-    """What is looked at or not, whether the backend says that it looks, and a system that differs only there."""
+    """The parts, whether the backend says that it uses each, and a system that differs only there."""
     plan = job.system.plan
     scenario = plan.scenario
     if scenario is not None:
@@ -403,8 +402,8 @@ def _tree(folder: Path) -> dict[str, bytes]:
 
 
 def _children() -> set[int]:
-    """The processes that this one started and that still run; none where the system does not tell. The second solver's
-    is the pipeline's own, which keeps it for the next question: it is ended first."""
+    """The running child processes of this one; empty if the operating system does not list them. The second solver's
+    process belongs to the pipeline, which keeps it for the next query: it is ended first."""
     CVC5.close()
     if sys.platform != "linux":
         return set()
