@@ -1,12 +1,12 @@
 """A callback class, driven: a node of rospy or rclpy, unmodified, in virtual time and without ROS.
 
 `Driven` stands in for the modules that such a file imports: ROS' own (`avow.drive.rospy`, `avow.drive.rclpy`) and the
-messages of the packages that are given. What ROS has and this has not is an error that names it, also where the class
-catches it. Callbacks run one at a time, in the order of their times; a timer that is due at a message's time comes
-first. Time stands still while a callback runs.
+messages of the packages that are given. Anything in ROS that is missing here is an error that names it, even if the
+class catches it. Callbacks run one at a time, in the order of their times; a timer that is due at a message's time
+comes first. Time stands still while a callback runs.
 
-A message crosses as data: a whole number ``{"i": digits}``, a float ``{"f": hexadecimal}``, an array ``{"l": [...]}``,
-a message ``{"d": [[field, value], ...]}``; texts and truth values are their own JSON.
+A message is passed as data: a whole number ``{"i": digits}``, a float ``{"f": hexadecimal}``, an array
+``{"l": [...]}``, a message ``{"d": [[field, value], ...]}``; texts and truth values are their own JSON.
 """
 
 from __future__ import annotations
@@ -48,11 +48,11 @@ INTEGERS = {f"{sign}int{bits}": (sign, bits) for sign in ("", "u") for bits in (
 
 
 class NotDriven(RuntimeError):  # noqa: N818 - it says what is the matter
-    """The class asks for something of ROS that is not driven here."""
+    """The class uses a part of ROS that is not driven here."""
 
 
 class Driven:
-    """What stands in for ROS in one process."""
+    """The stand-in for ROS in one process."""
 
     def __init__(self, spec: Any) -> None:
         self.kind: str = spec["kind"]
@@ -72,7 +72,7 @@ class Driven:
         self._loaded: Callable[[], None] | None = None
 
     def begin(self, now: int) -> None:
-        """A new run, from what there was when the file had been loaded. What was refused once stays refused."""
+        """A new run, from the state after the file was loaded. The list of refusals is kept."""
         if self._loaded is None:
             said, heard, spoken, due = list(self.said), dict(self.heard), dict(self.spoken), list(self.due)
 
@@ -84,16 +84,16 @@ class Driven:
         self._loaded()
         self.now, self.ran, self.handled = now, 0, 0
 
-    # -- what is not there -------------------------------------------------------------------------------
+    # -- missing parts -----------------------------------------------------------------------------------
 
     def refuse(self, what: str) -> NotDriven:
-        """Kept, so that it is told also where the class catches it."""
+        """The error is recorded, so that it is reported even if the class catches it."""
         self.refused.append(what)
         return NotDriven(f"{what} is not driven")
 
     def module(self, name: str, content: dict[str, Any]) -> types.ModuleType:
         made = types.ModuleType(name)
-        vars(made).update({"__path__": [], **content})  # so that a module of it is looked for, and refused
+        vars(made).update({"__path__": [], **content})  # so that its submodules are searched for, and refused
 
         def absent(attribute: str) -> Any:
             if attribute.startswith("__"):
@@ -128,7 +128,7 @@ class Driven:
         heapq.heappush(self.due, (at, self._order, act))
 
     def until(self, end: int) -> None:
-        """Whatever is due up to then, in the order of its times."""
+        """Run everything that is due up to `end`, in order of time."""
         while self.due and self.due[0][0] <= end:
             at, _, act = heapq.heappop(self.due)
             self.now = max(self.now, at)
@@ -213,7 +213,7 @@ class Driven:
         return float(text) if kind.startswith("float") else text
 
     def fresh(self, wire: Any) -> Any:
-        """What a field holds that nobody has set."""
+        """The default value of a field."""
         if isinstance(wire, dict):
             if "n" in wire:
                 return self.classes[wire["n"]]()
@@ -225,15 +225,15 @@ class Driven:
         return False if wire == "bool" else 0.0 if wire.startswith("float") else ""
 
     def moment(self, wire: str, nanoseconds: int) -> Any:
-        """A field's time. Given by the ROS that is driven."""
+        """The time value of a field. Defined by the driven version of ROS."""
         raise NotImplementedError
 
     def nanoseconds(self, wire: str, value: Any) -> int:
-        """Of a field's time. Raises TypeError."""
+        """The nanoseconds of a field's time. Raises TypeError."""
         raise NotImplementedError
 
     def data(self, wire: Any, value: Any, where: str) -> Any:
-        """A value as it goes over the wire. Raises TypeError, ValueError where ROS would refuse it."""
+        """A value as it is transmitted. Raises TypeError or ValueError if ROS would reject it."""
         if isinstance(wire, dict) and "n" in wire:
             if type(value) is not self.classes[wire["n"]]:
                 raise TypeError(f"{where}: {value!r} is no {wire['n']}")
@@ -269,7 +269,7 @@ class Driven:
         return value
 
     def value(self, wire: Any, data: Any) -> Any:
-        """What a subscriber gets: an object of its own."""
+        """The value for a subscriber: a separate object."""
         if isinstance(wire, dict) and "n" in wire:
             given = dict(data["d"])
             made = self.classes[wire["n"]]()
@@ -287,7 +287,7 @@ class Driven:
     # -- modules -----------------------------------------------------------------------------------------
 
     def install(self) -> None:
-        """The modules of messages, and the refusal of every other module of ROS."""
+        """Install the modules of messages, and refuse every other module of ROS."""
         self.classes |= {name: self.message_class(name) for name in self.types}
         packages: dict[str, dict[str, Any]] = {}
         for name, made in self.classes.items():
@@ -300,7 +300,7 @@ class Driven:
 
 
 class _Refusing(importlib.abc.MetaPathFinder):
-    """What is imported and belongs to ROS, and has no stand-in."""
+    """Refuses imports of ROS modules that have no stand-in."""
 
     def __init__(self, driven: Driven, packages: frozenset[str]) -> None:
         self._driven, self._packages = driven, packages
@@ -317,7 +317,7 @@ class _Refusing(importlib.abc.MetaPathFinder):
 
 
 class Strict:
-    """An object of ROS: what ROS gives it besides is refused by name."""
+    """An object of ROS: its other attributes in ROS are refused by name."""
 
     _driven: Driven
     _called = ""
@@ -329,7 +329,7 @@ class Strict:
 
 
 class Log:
-    """Takes what is logged, and says nothing."""
+    """Ignores what is logged."""
 
     def __init__(self, names: Sequence[str]) -> None:
         for name in names:
@@ -337,11 +337,11 @@ class Log:
 
     @staticmethod
     def nothing(*_given: Any, **_named: Any) -> None:
-        """Nothing of a message in a log is judged."""
+        """Log messages are not judged."""
 
 
 def answers(driven: Driven, values: Any, make: Callable[[Any, Any], Any]) -> Callable[[Any, Any], Callable[[str], str]]:
-    """What drives a class: given the class and what it is to be made with, a function from a case to what came of it.
+    """The driver of a class: given the class and its specification, a function from a case to its result.
 
     `values` is the module that decodes parameters; `make` makes an object.
     """
@@ -358,7 +358,7 @@ def answers(driven: Driven, values: Any, make: Callable[[Any, Any], Any]) -> Cal
                     driven.until(int(at))
                     driven.handled += 1
                     driven.deliver(topic, data)
-                    driven.until(driven.now)  # what it said to itself
+                    driven.until(driven.now)  # messages that it sent to itself
                 driven.until(int(asked["end"]))
                 del node
                 if threading.active_count() > 1:

@@ -1,4 +1,4 @@
-"""What stands in for rclpy (https://docs.ros.org/en/rolling/p/rclpy), for a class that is driven."""
+"""The stand-in for rclpy (https://docs.ros.org/en/rolling/p/rclpy), for a driven class."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ OF_NODES += (
     "clients",
 )
 OF_NODES += ("executor",)
-"""How names of rclpy's Node begin: what of them is not here is refused, and anything else is the class's own."""
+"""Prefixes of names of rclpy's Node: such a name that is missing here is refused; other names are the class's own."""
 
 
 def modules(base: Any, spec: Any, values: Any) -> Callable[[Any, Any], Callable[[str], str]]:
-    """Install them; what drives a class. `base` is the module `callbacks`."""
+    """Install the modules; the driver of a class. `base` is the module `callbacks`."""
     driven = _world(base, spec)
     time, duration = _moments(base, driven)
     kinds = _endpoints(base, driven, time)
@@ -111,7 +111,7 @@ def _moments(base: Any, driven: Any) -> tuple[Any, Any]:
 
 
 def _endpoints(base: Any, driven: Any, time: Any) -> dict[str, Any]:
-    """What a node makes, and its clock; by name."""
+    """The classes of the objects that a node creates, and of its clock; by name."""
 
     class Publisher(base.Strict):  # type: ignore[misc]
         _driven, _called = driven, "rclpy.publisher.Publisher"
@@ -166,7 +166,7 @@ def _endpoints(base: Any, driven: Any, time: Any) -> dict[str, Any]:
 
 def _node(base: Any, driven: Any, kinds: dict[str, Any]) -> Any:
     class Node:
-        """What a node inherits. Whatever else rclpy's Node has is refused by name."""
+        """The base class of nodes. The other attributes of rclpy's Node are refused by name."""
 
         def __init__(self, node_name: str, *, namespace: Any = None, use_global_arguments: bool = True) -> None:
             self._avow_declared: dict[str, Any] = {}
@@ -233,7 +233,7 @@ def _node(base: Any, driven: Any, kinds: dict[str, Any]) -> Any:
 
 def _qos() -> dict[str, Any]:
     class QoSProfile:
-        """How much is kept, and how surely it is sent: here every message arrives."""
+        """Queue sizes and reliability: here every message arrives."""
 
         def __init__(self, **named: Any) -> None:
             vars(self).update(named)

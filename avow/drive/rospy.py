@@ -1,4 +1,4 @@
-"""What stands in for rospy (http://wiki.ros.org/rospy/Overview), for a class that is driven."""
+"""The stand-in for rospy (http://wiki.ros.org/rospy/Overview), for a driven class."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ LOGS = ("logdebug", "loginfo", "logwarn", "logerr", "logfatal")
 
 
 def modules(base: Any, spec: Any, values: Any) -> Callable[[Any, Any], Callable[[str], str]]:
-    """Install them; what drives a class. `base` is the module `callbacks`."""
+    """Install the modules; the driver of a class. `base` is the module `callbacks`."""
     driven = _world(base, spec)
     driven.time, driven.duration = time, duration = _times(driven, _moment(driven))
     find = _parameters(driven)
 
     def init_node(name: str, anonymous: bool = False, log_level: Any = None, disable_signals: bool = False) -> None:
-        """The node's name is what the plan says of it."""
+        """No effect: the plan gives the node's name."""
 
     class ROSException(Exception):  # noqa: N818 - rospy's name
         pass
@@ -80,12 +80,12 @@ def _moment(driven: Any) -> Any:
                 if nsecs != 0:
                     raise ValueError("if secs is a float, nsecs cannot be set")
                 whole = int(secs)
-                secs, nsecs = whole, int((secs - whole) * 1000000000)  # cut off, as genpy does
+                secs, nsecs = whole, int((secs - whole) * 1000000000)  # truncated, as in genpy
             self.ns = int(secs) * SECOND + int(nsecs)
             self.possible()
 
         def possible(self) -> None:
-            """Raises TypeError where there is no such moment."""
+            """Raises TypeError if there is no such moment."""
 
         def __getattr__(self, name: str) -> Any:
             if name.startswith("__"):
@@ -270,7 +270,7 @@ def _endpoints(base: Any, driven: Any) -> tuple[Any, Any, Any]:
 
 def _parameters(driven: Any) -> Callable[[str], Any]:
     def find(name: str) -> Any:
-        """Parameters of the declared file are the node's own: ``~limit``, and ``limit`` by no namespace."""
+        """Parameters of the declared file are the node's own: ``~limit``, and ``limit`` without a namespace."""
         at: Any = driven.params
         for part in name.lstrip("~").strip("/").split("/"):
             at = at[part] if isinstance(at, dict) and part in at else _NONE
@@ -290,7 +290,7 @@ def _getter(find: Callable[[str], Any]) -> Callable[..., Any]:
 
 
 def _takes(made: Any) -> bool:
-    """Whether the class is made with its parameters."""
+    """Whether the class's constructor takes its parameters."""
     code = getattr(made.__init__, "__code__", None)
     defaults = getattr(made.__init__, "__defaults__", None) or ()
     return code is not None and code.co_argcount - len(defaults) > 1

@@ -1,10 +1,10 @@
-"""A step class, driven: made with its parameters, given its memory, asked for one step after another.
+"""A step class, driven: constructed with its parameters, given its memory, called for one step after another.
 
 A step class has ``__init__(self, params)`` (or ``__init__(self)``) and ``step(self, **inputs)``, which returns its one
 output, or a dict of outputs by name. Memory is held in attributes.
 
-Values cross as JSON that keeps every bit: a float is ``{"f": hexadecimal}``, an int ``{"i": digits}``, a Fraction
-``{"q": [numerator, denominator]}``, a list ``{"l": [...]}``, what is given as a tuple ``{"t": [...]}``; truth values
+Values are passed as JSON that keeps every bit: a float is ``{"f": hexadecimal}``, an int ``{"i": digits}``, a Fraction
+``{"q": [numerator, denominator]}``, a list ``{"l": [...]}``, a tuple argument ``{"t": [...]}``; truth values
 and texts are their own JSON.
 """
 
@@ -39,7 +39,7 @@ def plain(data: Any) -> Any:
 
 
 def coded(value: Any, depth: int = 0) -> Any:
-    """A value as data; what no step may return is named by its type."""
+    """A value as data; a value that no step may return is replaced by the name of its type."""
     inner = depth + 1
     if depth > 10:
         return {"?": "something nested too deeply"}
@@ -61,14 +61,15 @@ def coded(value: Any, depth: int = 0) -> Any:
 
 
 def _kept_as(before: Any, value: Any) -> Any:
-    """What an attribute is given: where it holds a member of an enumeration, the member that a text names."""
+    """The value for an attribute: if it holds a member of an enumeration, the member named by a text."""
     if isinstance(before, enum.Enum) and isinstance(value, str):
         return type(before).__members__.get(value, value)
     return value
 
 
 def driver(made: Any, spec: Any) -> Callable[[str], str]:
-    """What answers a case: a run of the class `made` from a start. `spec` says its parameters and its memory."""
+    """The function that answers a case: a run of the class `made` from a start. `spec` has its parameters and its
+    memory."""
     code = getattr(made.__init__, "__code__", None)
     wants = code is not None and code.co_argcount > 1
     memory: dict[str, str] = dict(spec["memory"])
@@ -88,7 +89,7 @@ def driver(made: Any, spec: Any) -> Callable[[str], str]:
 
     def run(case: str) -> str:
         asked = json.loads(case)
-        node = kept[0] if asked.get("on") else start()  # "on": the run goes on with the object of the case before
+        node = kept[0] if asked.get("on") else start()  # "on": the run continues with the object of the previous case
         kept[:] = [node]
         for port, value in (asked.get("memory") or {}).items():
             setattr(node, memory[port], _kept_as(getattr(node, memory[port], None), plain(value)))
