@@ -94,7 +94,7 @@ def find_tool(
     pattern: str = r"\d+(\.\d+)+",
     optional: bool = True,
 ) -> Tool:
-    """The program `name` on the PATH, with its version ("unknown"if it prints none). Never raises."""
+    """The program `name` on the PATH, with its version ("unknown" if it prints none). Never raises."""
     path = shutil.which(name)
     if path is None:
         return Tool(name, None, None, install, optional)
