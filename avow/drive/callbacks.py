@@ -11,6 +11,7 @@ A message is passed as data: a whole number ``{"i": digits}``, a float ``{"f": h
 
 from __future__ import annotations
 
+import array
 import heapq
 import importlib.abc
 import importlib.machinery
@@ -187,7 +188,9 @@ class Driven:
                 )
             wrong = [field for field in named if field not in fields]
             if wrong:
-                raise AttributeError(f"{name} has no field {wrong[0]!r}")
+                raise (AssertionError if driven.kind == "rclpy" else AttributeError)(
+                    f"{name} has no field {wrong[0]!r}"
+                )
             for field, wire in fields.items():
                 setattr(self, field, named[field] if field in named else driven.fresh(wire))
             for field, value in zip(fields, given, strict=False):
@@ -240,7 +243,7 @@ class Driven:
             fields = self.types[wire["n"]]["fields"]
             return {"d": [[f, self.data(inner, getattr(value, f), f"{where}.{f}")] for f, inner in fields]}
         if isinstance(wire, dict):
-            if not isinstance(value, list | tuple | bytes | bytearray):
+            if not isinstance(value, list | tuple | bytes | bytearray | array.array):
                 raise TypeError(f"{where}: {value!r} is no array")
             if wire["length"] is not None and len(value) != wire["length"]:
                 raise ValueError(f"{where} has {wire['length']} items, not {len(value)}")

@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
+import array
 import functools
+import math
 import re
 import types
-from collections.abc import Callable
+from collections import UserList, UserString
+from collections.abc import Callable, Sequence, Set
 from typing import Any
 
 SECOND = 10**9
 LOGS = ("debug", "info", "warn", "warning", "error", "fatal")
+LARGEST = {"float32": 3.402823466e38, "float64": 1.7976931348623157e308}
+ARRAYS = {"float32": "f", "float64": "d", "int8": "b", "uint8": "B", "int16": "h", "uint16": "H"}
+ARRAYS |= {"int32": "i", "uint32": "I", "int64": "q", "uint64": "Q"}
+"""The type code of a field that holds any number of such numbers: rclpy keeps them in an `array.array`."""
 OF_NODES: tuple[str, ...] = ("create_", "destroy_", "get_", "set_", "add_", "remove_", "declare_", "undeclare_")
 OF_NODES += (
     "describe_",
@@ -59,6 +66,48 @@ def _world(base: Any, spec: Any) -> Any:
             if type(value) is not self.classes[WIRES[wire]]:
                 raise TypeError(f"{value!r} is no {WIRES[wire]}")
             return int(value.sec) * SECOND + int(value.nanosec)
+
+        def message_class(self, name: str) -> Any:
+            """Its fields take what the setters that rosidl generates take, and raise AssertionError otherwise."""
+            made = super().message_class(name)
+            for field, wire in self.types[name]["fields"]:
+                setattr(made, field, self.checked(field, wire, vars(made)[field]))
+            return made
+
+        def checked(self, field: str, wire: Any, slot: Any) -> property:
+            def put(message: Any, value: Any) -> None:
+                item = wire["a"] if isinstance(wire, dict) and "a" in wire else None
+                length = wire["length"] if item is not None else None
+                code = ARRAYS.get(item) if length is None and isinstance(item, str) else None
+                if length is not None and getattr(getattr(value, "dtype", None), "name", None) == item:
+                    value = value.tolist()  # numpy's, for a field of fixed length
+                if item is None:
+                    fits = self.fits(wire, value)
+                else:
+                    fits = isinstance(value, Sequence | Set | UserList) and not isinstance(value, str | UserString)
+                    fits = fits and len(value) == (len(value) if length is None else length)
+                    fits = fits and getattr(value, "typecode", code) == code and all(self.fits(item, v) for v in value)
+                if not fits:
+                    kind, array_of = (wire, "") if item is None else (item, f"[{length or ''}]")
+                    of = f"{kind['n'] if isinstance(kind, dict) else kind}{array_of}"
+                    raise AssertionError(f"the field {field!r} must be of type {of}, not {value!r}"[:200])
+                if item is not None and (length is not None or not isinstance(value, list | tuple)):
+                    value = list(value)
+                slot.__set__(message, array.array(code, value) if code else value)
+
+            return property(slot.__get__, put)
+
+        def fits(self, wire: Any, value: Any) -> bool:
+            """Whether a field that is no array takes the value."""
+            if isinstance(wire, dict) or wire in WIRES:
+                return isinstance(value, self.classes[WIRES[wire] if isinstance(wire, str) else wire["n"]])
+            if wire in base.INTEGERS:
+                sign, bits = base.INTEGERS[wire]
+                low, high = (0, 2**bits) if sign else (-(2 ** (bits - 1)), 2 ** (bits - 1))
+                return isinstance(value, int) and low <= value < high
+            if wire.startswith("float"):
+                return isinstance(value, float) and (not abs(value) > LARGEST[wire] or math.isinf(value))
+            return isinstance(value, bool if wire == "bool" else str)
 
     return World(spec)
 

@@ -207,6 +207,64 @@ def test_a_recording_hangs_on_nothing_else(tmp_path: Path, line: str, why: str) 
     assert why in told(drive(folder, "watch", trace(tmp_path)))
 
 
+SETTERS = [  # field, a value that rosidl's setter takes, and one that it does not
+    ("number", "1.0", "1"),
+    ("number", "float('inf')", "'1.0'"),
+    ("single", "0.1", "1e39"),
+    ("single", "0.1", "True"),
+    ("whole", "True", "1.0"),
+    ("whole", "-128", "128"),
+    ("whole", "5", "'5'"),
+    ("flag", "True", "1"),
+    ("word", "'a'", "b'a'"),
+    ("numbers", "(1.0, 2.0)", "[1]"),
+    ("numbers", "array.array('d', [1.0])", "array.array('f', [1.0])"),
+    ("three", "[1.0, 2.0, 3.0]", "[1.0, 2.0]"),
+    ("words", "{'a'}", "'a'"),
+    ("inner", "Float64(data=1.0)", "1.0"),
+    ("inners", "[Float64()]", "[1.0]"),
+    ("at", "Time(sec=1)", "1.0"),
+]
+FIELDS = """\
+float64 number
+float32 single
+int8 whole
+bool flag
+string word
+float64[] numbers
+float64[3] three
+string[] words
+std_msgs/Float64 inner
+std_msgs/Float64[] inners
+builtin_interfaces/Time at
+"""
+
+
+@pytest.mark.slow
+def test_fields_of_ros_2_take_what_its_setters_take(tmp_path: Path) -> None:
+    """At the assignment and in the constructor, whether or not the message is published."""
+    lines = "import array; from own_msgs.msg import All; from std_msgs.msg import Float64"
+    lines += "; from builtin_interfaces.msg import Time; made, wrong = All(), []"
+    for field, good, bad in SETTERS:
+        lines += f"\n        made.{field} = {good}; All({field}={good})"
+        for line in (f"made.{field} = {bad}", f"All({field}={bad})"):
+            lines += f"\n        try: {line}\n        except AssertionError: pass\n        else: wrong.append({line!r})"
+    lines += "\n        made.numbers.append(1)\n        assert made.numbers[-1:].tolist() == [1.0]"
+    lines += "\n        if wrong: raise ValueError(wrong)"
+    folder = system(tmp_path / "w", "rclpy", ROS2.replace("# HERE", lines))
+    (folder / "msg/own_msgs/msg").mkdir(parents=True)
+    (folder / "msg/own_msgs/msg/All.msg").write_text(FIELDS, encoding="utf-8")
+    plan = folder / "plan.yaml"
+    plan.write_text(plan.read_text(encoding="utf-8") + "messages: [msg]\n", encoding="utf-8")
+    done = drive(folder, "watch", trace(tmp_path))
+    assert done.return_value == 0, (done.output, done.exception)
+    for line in ("self.said.publish(String(data=1))", "message.data = 1", "String(dat='x')"):
+        (folder / "src/watch.py").write_text(ROS2.replace("# HERE", line), encoding="utf-8")
+        done = drive(folder, "watch", trace(tmp_path))
+        assert done.return_value == 1, (line, done.output)
+        assert "AssertionError" in done.output
+
+
 @pytest.mark.slow
 def test_nodes_of_ros_2_have_what_they_have(tmp_path: Path) -> None:
     folder = system(tmp_path / "w", "rclpy", ROS2.replace("# HERE", "self.create_client(None, 'x')"))
