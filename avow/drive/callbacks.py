@@ -17,9 +17,11 @@ import importlib.abc
 import importlib.machinery
 import json
 import math
+import os
 import struct
 import sys
 import threading
+import traceback
 import types
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -46,6 +48,26 @@ FOREIGN += (
     "tf_transformations",
 )
 INTEGERS = {f"{sign}int{bits}": (sign, bits) for sign in ("", "u") for bits in (8, 16, 32, 64)}
+
+
+INSTEAD = {
+    "Node(allow_undeclared_parameters=)": "declare_parameter for each",
+    "Node(automatically_declare_parameters_from_overrides=)": "declare_parameter for each",
+    "add_on_set_parameters_callback": "read the parameter in __init__; it keeps its value while the class is driven",
+    "create_timer(clock=)": "create_timer without a clock, which uses the node's",
+    "ReentrantCallbackGroup": "MutuallyExclusiveCallbackGroup, if the callbacks may run one at a time",
+    "create_rate": "create_timer",
+    "Rate": "Timer",
+}
+"""What of ROS is not driven (how its name ends), and what may serve in its place."""
+
+
+def called_from(frames: Sequence[traceback.FrameSummary]) -> str:
+    """The line of the class's own code at which something came about: not ours, not Python's."""
+    known = tuple(os.path.realpath(os.path.dirname(file)) for file in (os.path.dirname(__file__), os.__file__))  # noqa: PTH120
+    own = [frame for frame in frames if not os.path.realpath(frame.filename).startswith(known)]
+    own = [frame for frame in own if not frame.filename.startswith("<")]
+    return f" ({os.path.basename(own[-1].filename)}, line {own[-1].lineno})" if own else ""  # noqa: PTH119
 
 
 class NotDriven(RuntimeError):  # noqa: N818 - it says what is the matter
@@ -88,9 +110,10 @@ class Driven:
     # -- missing parts -----------------------------------------------------------------------------------
 
     def refuse(self, what: str) -> NotDriven:
-        """The error is recorded, so that it is reported even if the class catches it."""
-        self.refused.append(what)
-        return NotDriven(f"{what} is not driven")
+        """The error is recorded, so that it is reported even if the class catches it; with its line and an alternative."""
+        instead = next((f"; instead: {text}" for end, text in INSTEAD.items() if what.endswith(end)), "")
+        self.refused.append(f"{what}{called_from(traceback.extract_stack())}{instead}")
+        return NotDriven(f"{what} is not driven{instead}")
 
     def module(self, name: str, content: dict[str, Any]) -> types.ModuleType:
         made = types.ModuleType(name)
@@ -314,7 +337,7 @@ class _Refusing(importlib.abc.MetaPathFinder):
         first = fullname.partition(".")[0]
         of_messages = first.endswith(("_msgs", "_interfaces", "_srvs")) or first in self._packages
         if first in FOREIGN or of_messages:
-            self._driven.refused.append(f"the module {fullname}")
+            self._driven.refuse(f"the module {fullname}")
             raise ModuleNotFoundError(f"the module {fullname} is not driven", name=fullname)
         return None
 

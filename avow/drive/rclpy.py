@@ -17,6 +17,10 @@ LARGEST = {"float32": 3.402823466e38, "float64": 1.7976931348623157e308}
 ARRAYS = {"float32": "f", "float64": "d", "int8": "b", "uint8": "B", "int16": "h", "uint16": "H"}
 ARRAYS |= {"int32": "i", "uint32": "I", "int64": "q", "uint64": "Q"}
 """The type code of a field that holds any number of such numbers: rclpy keeps them in an `array.array`."""
+DEFAULTS = {"raw": False, "autostart": True, "start_parameter_services": True, "enable_rosout": True}
+DEFAULTS |= {"allow_undeclared_parameters": False, "automatically_declare_parameters_from_overrides": False}
+VALUES = tuple(f"{kind}_value" for kind in ("bool", "integer", "double", "string", "byte_array"))
+VALUES += tuple(f"{kind}_array_value" for kind in ("bool", "integer", "double", "string"))
 OF_NODES: tuple[str, ...] = ("create_", "destroy_", "get_", "set_", "add_", "remove_", "declare_", "undeclare_")
 OF_NODES += (
     "describe_",
@@ -48,11 +52,16 @@ def modules(base: Any, spec: Any, values: Any) -> Callable[[Any, Any], Callable[
             ("time", {"Time": time}),
             ("duration", {"Duration": duration}),
             ("qos", _qos()),
+            ("callback_groups", {"MutuallyExclusiveCallbackGroup": MutuallyExclusiveCallbackGroup}),
             *((name.lower(), {name: kind}) for name, kind in kinds.items()),
         )
     }
     driven.module("rclpy", content)
     return base.answers(driven, values, _maker(driven, node))  # type: ignore[no-any-return]
+
+
+class MutuallyExclusiveCallbackGroup:
+    """A callback group that changes nothing: callbacks run one at a time."""
 
 
 def _world(base: Any, spec: Any) -> Any:
@@ -204,6 +213,21 @@ def _endpoints(base: Any, driven: Any, time: Any) -> dict[str, Any]:
         def __init__(self, name: str, value: Any = None) -> None:
             self.name, self.value = name, value
 
+        def get_parameter_value(self) -> Any:
+            """A message rcl_interfaces/ParameterValue: the field of the parameter's type, defaults in the others."""
+            held = self.value
+            many = isinstance(held, list | tuple)
+            kinds = [type(each) for each in held] if many else [type(held)]
+            number = next((n for n, kind in enumerate((bool, int, float, str), 1) if {*kinds} == {kind}), 0)
+            fields = dict(zip(VALUES, (False, 0, 0.0, "", [], [], array.array("q"), array.array("d"), []), strict=True))
+            if number:
+                code = {2: "q", 3: "d"}.get(number) if many else None
+                number += 5 if many else 0
+                fields[VALUES[number - 1]] = array.array(code, held) if code else held
+            elif held is not None:
+                raise driven.refuse(f"the type of the parameter {self.name}")
+            return types.SimpleNamespace(type=number, **fields)
+
     class Clock(base.Strict):  # type: ignore[misc]
         _driven, _called = driven, "rclpy.clock.Clock"
 
@@ -214,20 +238,32 @@ def _endpoints(base: Any, driven: Any, time: Any) -> dict[str, Any]:
 
 
 def _node(base: Any, driven: Any, kinds: dict[str, Any]) -> Any:
+    def plain(called: str, more: dict[str, Any]) -> None:
+        """Refuses what else is given, unless it is the default, or an exclusive group."""
+        for name, given in more.items():
+            if given is not DEFAULTS.get(name) and type(given) is not MutuallyExclusiveCallbackGroup:
+                raise driven.refuse(f"rclpy.node.{called}({name}=)")
+
     class Node:
         """The base class of nodes. The other attributes of rclpy's Node are refused by name."""
 
-        def __init__(self, node_name: str, *, namespace: Any = None, use_global_arguments: bool = True) -> None:
+        def __init__(
+            self, node_name: str, *, namespace: Any = None, use_global_arguments: bool = True, **more: Any
+        ) -> None:
+            plain("Node", more)
             self._avow_declared: dict[str, Any] = {}
 
-        def create_subscription(self, msg_type: Any, topic: str, callback: Any, qos_profile: Any) -> Any:
+        def create_subscription(self, msg_type: Any, topic: str, callback: Any, qos_profile: Any, **more: Any) -> Any:
+            plain("Node.create_subscription", more)
             driven.hear(topic, msg_type, callback)
             return kinds["Subscription"]()
 
-        def create_publisher(self, msg_type: Any, topic: str, qos_profile: Any) -> Any:
+        def create_publisher(self, msg_type: Any, topic: str, qos_profile: Any, **more: Any) -> Any:
+            plain("Node.create_publisher", more)
             return kinds["Publisher"](driven.speak(topic, msg_type), msg_type)
 
-        def create_timer(self, timer_period_sec: float, callback: Any) -> Any:
+        def create_timer(self, timer_period_sec: float, callback: Any, callback_group: Any = None, **more: Any) -> Any:
+            plain("Node.create_timer", {"callback_group": callback_group, **more})
             if not timer_period_sec > 0:
                 raise ValueError(f"a timer's period is above 0, not {timer_period_sec!r}")
             return kinds["Timer"](int(float(timer_period_sec) * SECOND), callback)

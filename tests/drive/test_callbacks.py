@@ -271,6 +271,48 @@ def test_nodes_of_ros_2_have_what_they_have(tmp_path: Path) -> None:
     assert "rclpy.node.Node.create_client" in told(drive(folder, "watch", trace(tmp_path)))
 
 
+UNSUPPORTED = {  # what of rclpy is used, and what is told besides its name and line
+    "self.create_client(None, 'x')": "rclpy.node.Node.create_client",
+    "self.add_on_set_parameters_callback(print)": "add_on_set_parameters_callback (watch.py, line {}); instead: read",
+    "self.create_timer(1.0, print, clock=self.get_clock())": "create_timer(clock=) (watch.py, line {}); instead: ",
+    "self.create_timer(1.0, print, autostart=False)": "create_timer(autostart=) (watch.py, line {})",
+    "import rclpy.callback_groups as g; g.ReentrantCallbackGroup()": "CallbackGroup (watch.py, line {}); instead: Mut",
+    "Node('other', allow_undeclared_parameters=True)": "parameters=) (watch.py, line {}); instead: declare_parameter",
+    "self.create_subscription(String, 's', print, 1, raw=True)": "create_subscription(raw=) (watch.py, line {})",
+    "import nav_msgs.msg as _": "the module nav_msgs (watch.py, line {})",
+}
+
+
+@pytest.mark.slow
+def test_what_of_ros_2_is_not_driven_has_its_line_and_an_alternative(tmp_path: Path) -> None:
+    lines = "".join(f"\n        try: {line}\n        except Exception: pass" for line in UNSUPPORTED)
+    first = ROS2[: ROS2.index("# HERE")].count("\n") + 2
+    folder = system(tmp_path / "w", "rclpy", ROS2.replace("# HERE", lines))
+    found = told(drive(folder, "watch", trace(tmp_path)))
+    wanted = [why.format(first + 2 * at) for at, why in enumerate(UNSUPPORTED.values())]
+    assert [why for why in wanted if why not in found] == [], found
+
+
+@pytest.mark.slow
+def test_typed_parameter_values_and_exclusive_groups_are_driven(tmp_path: Path) -> None:
+    values = {"True": "bool", "3": "integer", "2.5": "double", "'a'": "string", "[True]": "bool_array"}
+    values |= {"[3]": "integer_array", "[2.5]": "double_array", "['a']": "string_array"}
+    lines = "from rclpy.callback_groups import MutuallyExclusiveCallbackGroup as G; wrong = []"
+    lines += "\n        self.create_subscription(String, 's', print, 1, callback_group=G())"
+    lines += "\n        self.create_timer(9.0, print, callback_group=G()); self.create_timer(9.0, print, None)"
+    for value, kind in values.items():
+        name = f"p{kind}"
+        lines += f"\n        if not self.has_parameter('{name}'): self.declare_parameter('{name}', {value})"
+        lines += f"\n        held = self.get_parameter('{name}').get_parameter_value()"
+        lines += f"\n        others = [k for k in vars(held) if k not in ('type', '{kind}_value') and getattr(held, k)]"
+        array_of = "list" if value.startswith("[") else ""
+        lines += f"\n        same = {array_of}(held.{kind}_value) == {value}"
+        lines += f"\n        if others or not same: wrong.append('{kind}')"
+    lines += "\n        assert wrong == [], wrong"
+    done = drive(system(tmp_path / "w", "rclpy", ROS2.replace("# HERE", lines)), "watch", trace(tmp_path))
+    assert done.return_value == 0, (done.output, done.exception)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("old", "new", "why"),
