@@ -377,20 +377,23 @@ def answers(driven: Driven, values: Any, make: Callable[[Any, Any], Any]) -> Cal
             asked = json.loads(case)
             driven.begin(int(asked["start"]))
             driven.params = values.plain(spec["params"])
-            wrong = ""
+            wrong = on = ""
             try:
                 node = make(made, driven.params)
                 for topic, at, data in asked["events"]:
                     driven.until(int(at))
-                    driven.handled += 1
+                    driven.handled, on = driven.handled + 1, topic
                     driven.deliver(topic, data)
+                    on = ""
                     driven.until(driven.now)  # messages that it sent to itself
                 driven.until(int(asked["end"]))
                 del node
                 if threading.active_count() > 1:
                     driven.refuse("a thread of its own")
             except Exception as error:
-                wrong = f"{type(error).__name__}: {error}"[:300]
+                wrong = f"{type(error).__name__}: {error}"[:300] + called_from(
+                    traceback.extract_tb(error.__traceback__)
+                )
             return json.dumps(
                 {
                     "heard": {topic: kinds[0][0] for topic, kinds in driven.heard.items()},
@@ -399,6 +402,7 @@ def answers(driven: Driven, values: Any, make: Callable[[Any, Any], Any]) -> Cal
                     "refused": driven.refused,
                     "wrong": wrong,
                     "after": driven.handled,
+                    "on": on,
                 }
             )
 

@@ -68,9 +68,7 @@ def command(
     run = found.run(events, *((times[0], times[-1]) if times else (0, 0)))
     if output is not None:
         write_out(output, "".join(f"{line}\n" for line in _lines(found, run.beside(events))))
-    raised = (
-        (f"raised at message {run.after}: {run.wrong}" if run.after else f"raised: {run.wrong}",) if run.wrong else ()
-    )
+    raised = run.raised
     different: tuple[str, ...] = ()
     if replay and not raised:
         silent = not run.said and not any(event.topic in run.spoken for event, _ in recorded)

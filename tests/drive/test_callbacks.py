@@ -331,12 +331,23 @@ def test_a_class_that_does_not_fit(tmp_path: Path, old: str, new: str, why: str)
     assert why in told(drive(system(tmp_path / "w", "rospy", ROS1.replace(old, new)), "watch"))
 
 
+RAISED = [  # kind, what raises in the callback of a message (or, after TICK, of a timer), where it is told
+    ("rospy", "1 / 0", "raised at message 1 on /r: ZeroDivisionError"),
+    ("rospy", "self.said.publish(5)", "raised at message 1 on /r: TypeError"),
+    ("rclpy", "message.no_field = 1", "raised at message 1 on /r: AttributeError"),
+    ("rclpy", "message.no_field", "raised at message 1 on /r: AttributeError"),
+    ("rclpy", "self.create_timer(0.01, lambda: 1 / 0)", "raised after message 1: ZeroDivisionError"),
+]
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("line", some(["1 / 0", "self.said.publish(5)", "message.no_field = 1"], 1))
-def test_a_callback_that_raises_is_told(tmp_path: Path, line: str) -> None:
-    done = drive(system(tmp_path / "w", "rospy", ROS1.replace("# HERE", line)), "watch", trace(tmp_path))
+@pytest.mark.parametrize(("kind", "line", "why"), some(RAISED, 2))
+def test_what_a_callback_raises_has_its_message_topic_and_line(tmp_path: Path, kind: str, line: str, why: str) -> None:
+    text = ROS1 if kind == "rospy" else ROS2
+    done = drive(system(tmp_path / "w", kind, text.replace("# HERE", line)), "watch", trace(tmp_path))
     assert done.return_value == 1
-    assert "raised at message 1: " in done.output
+    assert why in done.output
+    assert f" (watch.py, line {text[: text.index('# HERE')].count(chr(10)) + 1})" in done.output
 
 
 @pytest.mark.slow

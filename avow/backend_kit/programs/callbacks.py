@@ -54,13 +54,21 @@ class Event:
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """The result of a run. `wrong`: the exception of the class, and at which message (from 1; 0: before any)."""
+    """The result of a run. `wrong`: the exception of the class, after which message (from 1; 0: before any), and on
+    which topic it was handled (none: a timer, or what the class published itself)."""
 
     said: tuple[Event, ...]
     heard: Mapping[str, str]
     spoken: Mapping[str, str]
     wrong: str = ""
     after: int = 0
+    on: str = ""
+
+    @property
+    def raised(self) -> tuple[str, ...]:
+        """The exception, with its message, topic, file and line; nothing if there is none."""
+        place = f" at message {self.after} on {self.on}" if self.on else f" after message {self.after}"
+        return (f"raised{place if self.after else ''}: {self.wrong}",) if self.wrong else ()
 
     def beside(self, heard: Sequence[Event]) -> Iterator[Event]:
         """Messages received and published, in order of occurrence."""
@@ -254,7 +262,7 @@ def _runs(
 
 def _made(reply: Mapping[str, Any]) -> Run:
     said = tuple(Event(topic, at, data, after) for topic, at, data, after in reply["said"])
-    return Run(said, reply["heard"], reply["spoken"], reply["wrong"], reply["after"])
+    return Run(said, reply["heard"], reply["spoken"], reply["wrong"], reply["after"], reply["on"])
 
 
 class Silent(Rejected):
