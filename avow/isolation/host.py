@@ -129,10 +129,18 @@ def load(path: str, function: str, drive: Any = None) -> Any:
     sys.modules["avow_subject"] = module
     sys.path.insert(0, os.path.dirname(path))  # noqa: PTH120 - its neighbours, as if it were run
     spec.loader.exec_module(module)
-    if drive is not None:
-        driven = json.loads(function)
-        return drive(getattr(module, driven["class"]), driven)
-    return getattr(module, function)
+    driven = json.loads(function) if drive is not None else None
+    name = function if driven is None else driven["class"]
+    try:
+        found = getattr(module, name)
+    except AttributeError:
+        import difflib
+
+        near = difflib.get_close_matches(name, [each for each in vars(module) if not each.startswith("_")], 1)
+        kind = "function" if driven is None else "class"
+        hint = f": did you mean {near[0]}?" if near else ""
+        raise AttributeError(f"{os.path.basename(path)} has no {kind} {name!r}{hint}") from None  # noqa: PTH119
+    return found if driven is None else drive(found, driven)
 
 
 def driving(function: str) -> Any:
@@ -219,9 +227,13 @@ def answer(function: Any, known: frozenset[str] | None, request: Mapping[str, An
 def _told(error: BaseException) -> str:
     """The error and where in the program it came from."""
     try:
-        place = next((f for f in reversed(traceback.extract_tb(error.__traceback__)) if f.filename != __file__), None)
-        where = f" ({os.path.basename(place.filename)}, line {place.lineno})" if place else ""  # noqa: PTH119
-        return f"{type(error).__name__}: {error}"[:500] + where
+        ours = os.path.dirname(os.path.dirname(os.path.realpath(__file__))) + os.sep  # noqa: PTH120
+        frames = [f for f in traceback.extract_tb(error.__traceback__) if not f.filename.startswith("<")]
+        own = [frame for frame in frames if not os.path.realpath(frame.filename).startswith(ours)]
+        where = f" ({os.path.basename(own[-1].filename)}, line {own[-1].lineno})" if own else ""  # noqa: PTH119
+        relative = isinstance(error, ImportError) and "relative import" in str(error)
+        hint = "; instead: `from NAME import …`, as the file's folder is searched" if relative else ""
+        return f"{type(error).__name__}: {error}"[:500] + where + hint
     except BaseException:
         return type(error).__name__
 

@@ -321,7 +321,11 @@ def test_typed_parameter_values_and_exclusive_groups_are_driven(tmp_path: Path) 
             ('"r", Float64', '"q", Float64', "never subscribes to /r"),
             ('"r", Float64', '"r", String', "subscribes to /r as std_msgs/String"),
             ('"status", String', '"~status", String', "never publishes /status"),
-            ("class Watch:", "class Other:", "cannot be loaded"),
+            (
+                "class Watch:",
+                "class Watcher:",
+                "cannot be loaded: AttributeError: watch.py has no class 'Watch': did you",
+            ),
             ("def __init__(self):", "def __init__(self):\n        1 / 0", "ZeroDivisionError"),
         ],
         2,
@@ -348,6 +352,22 @@ def test_what_a_callback_raises_has_its_message_topic_and_line(tmp_path: Path, k
     assert done.return_value == 1
     assert why in done.output
     assert f" (watch.py, line {text[: text.index('# HERE')].count(chr(10)) + 1})" in done.output
+
+
+LOADED = [  # the first line of the file, and what is told if it cannot be loaded
+    ("from .helper import x", "no known parent package (watch.py, line 1); instead: `from NAME import"),
+    ("from rospy import Rate", "Rate is not driven; instead: Timer (watch.py, line 1)"),
+    ("import no_such_module", "No module named 'no_such_module' (watch.py, line 1)"),
+    ("1 / 0", "division by zero (watch.py, line 1)"),
+]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("line", "why"), some(LOADED, 2))
+def test_a_file_that_cannot_be_loaded_has_its_own_line(tmp_path: Path, line: str, why: str) -> None:
+    found = told(drive(system(tmp_path / "w", "rospy", f"{line}\n{ROS1}"), "watch"))
+    assert why in found
+    assert not [word for word in ("importlib", "callbacks.py", "avow_subject") if word in found]
 
 
 @pytest.mark.slow
