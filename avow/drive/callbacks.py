@@ -12,6 +12,7 @@ A message is passed as data: a whole number ``{"i": digits}``, a float ``{"f": h
 from __future__ import annotations
 
 import array
+import datetime
 import heapq
 import importlib.abc
 import importlib.machinery
@@ -21,6 +22,7 @@ import os
 import struct
 import sys
 import threading
+import time
 import traceback
 import types
 from collections.abc import Callable, Sequence
@@ -47,6 +49,8 @@ FOREIGN += (
     "ament_index_python",
     "tf_transformations",
 )
+CLOCKS: tuple[str, ...] = ("time", "monotonic", "perf_counter", "process_time", "thread_time", "clock_gettime")
+CLOCKS += (*(f"{name}_ns" for name in CLOCKS), "localtime", "gmtime", "ctime", "strftime", "sleep")
 INTEGERS = {f"{sign}int{bits}": (sign, bits) for sign in ("", "u") for bits in (8, 16, 32, 64)}
 
 
@@ -58,6 +62,7 @@ INSTEAD = {
     "ReentrantCallbackGroup": "MutuallyExclusiveCallbackGroup, if the callbacks may run one at a time",
     "create_rate": "create_timer",
     "Rate": "Timer",
+    ".sleep": "a timer",
 }
 """What of ROS is not driven (how its name ends), and what may serve in its place."""
 
@@ -112,8 +117,30 @@ class Driven:
     def refuse(self, what: str) -> NotDriven:
         """The error is recorded, so that it is reported even if the class catches it; with its line and an alternative."""
         instead = next((f"; instead: {text}" for end, text in INSTEAD.items() if what.endswith(end)), "")
+        if what.startswith(("time.", "datetime.")) and not instead:
+            instead = f"; instead: {'rospy.Time.now()' if self.kind == 'rospy' else 'get_clock().now()'}"
         self.refused.append(f"{what}{called_from(traceback.extract_stack())}{instead}")
         return NotDriven(f"{what} is not driven{instead}")
+
+    def clocks(self) -> None:
+        """Refuses Python's clocks to the class: they go on while its own time stands still. Python itself has them."""
+        library = os.path.dirname(os.__file__) + os.sep  # noqa: PTH120
+
+        def refusing(name: str, real: Any) -> Any:
+            def read(*given: Any, **named: Any) -> Any:
+                if not sys._getframe(1).f_code.co_filename.startswith((library, "<")):
+                    raise self.refuse(name)
+                return real(*given, **named)
+
+            return read
+
+        for name in CLOCKS:
+            if hasattr(time, name):
+                setattr(time, name, refusing(f"time.{name}", getattr(time, name)))
+        for kind in (datetime.datetime, datetime.date):
+            reads = [name for name in ("now", "utcnow", "today") if hasattr(kind, name)]
+            content = {n: staticmethod(refusing(f"datetime.{kind.__name__}.{n}", getattr(kind, n))) for n in reads}
+            setattr(datetime, kind.__name__, _Substitute(kind.__name__, (kind,), {**content, "_avow_real": kind}))
 
     def module(self, name: str, content: dict[str, Any]) -> types.ModuleType:
         made = types.ModuleType(name)
@@ -313,7 +340,8 @@ class Driven:
     # -- modules -----------------------------------------------------------------------------------------
 
     def install(self) -> None:
-        """Install the modules of messages, and refuse every other module of ROS."""
+        """Install the modules of messages, and refuse every other module of ROS, and Python's clocks."""
+        self.clocks()
         self.classes |= {name: self.message_class(name) for name in self.types}
         packages: dict[str, dict[str, Any]] = {}
         for name, made in self.classes.items():
@@ -323,6 +351,13 @@ class Driven:
         for package, content in packages.items():
             self.module(package, {"msg": self.module(f"{package}.msg", content)})
         sys.meta_path.insert(0, _Refusing(self, frozenset(packages)))
+
+
+class _Substitute(type):
+    """A class in the place of another: instances of that one are its own."""
+
+    def __instancecheck__(cls, value: Any) -> bool:
+        return type.__instancecheck__(vars(cls).get("_avow_real", cls), value)  # a subclass of it is itself
 
 
 class _Refusing(importlib.abc.MetaPathFinder):

@@ -200,6 +200,32 @@ REFUSED = [
 ]
 
 
+CLOCKS = ["time.time()", "time.monotonic()", "time.perf_counter_ns()", "time.sleep(0)", "time.localtime()"]
+CLOCKS += ["datetime.datetime.now()", "datetime.datetime.utcnow()", "datetime.date.today()"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("kind", "instead"), [("rospy", "rospy.Time.now()"), ("rclpy", "get_clock().now()")])
+def test_a_clock_of_python_is_refused_by_name_and_line(tmp_path: Path, kind: str, instead: str) -> None:
+    """Also where two runs agree by chance, or it is caught; dates without a clock, and Python's own use, are driven."""
+    text = ROS1 if kind == "rospy" else ROS2
+    lines = "import datetime, logging, time, threading; logging.warning('x'); threading.Event().wait(0.001)"
+    lines += "\n        day = datetime.datetime(2026, 1, 1) + datetime.timedelta(1); assert day.day == 2"
+    lines += "\n        assert isinstance(day, datetime.datetime) and isinstance(day, datetime.date)"
+    lines += "\n        class Mixed: pass\n        class Own(Mixed, datetime.datetime): pass"
+    lines += "\n        assert isinstance(Own(2026, 1, 1), Own) and not isinstance(day, Own)"
+    folder = system(tmp_path / "w", kind, text.replace("# HERE", lines))
+    done = drive(folder, "watch", trace(tmp_path))
+    assert done.return_value == 0, (done.output, done.exception)
+    lines += "".join(f"\n        try: {line}\n        except Exception: pass" for line in CLOCKS)
+    (folder / "src/watch.py").write_text(text.replace("# HERE", lines), encoding="utf-8")
+    found = told(drive(folder, "watch", trace(tmp_path)))
+    first = text[: text.index("# HERE")].count("\n") + 7
+    wanted = [f"{line.partition('(')[0]} (watch.py, line {first + 2 * at})" for at, line in enumerate(CLOCKS)]
+    assert [why for why in wanted if why not in found] == [], found
+    assert f"; instead: {instead}" in found
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(("line", "why"), some(REFUSED, 3))
 def test_a_recording_hangs_on_nothing_else(tmp_path: Path, line: str, why: str) -> None:
