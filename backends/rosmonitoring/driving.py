@@ -10,7 +10,8 @@ from typing import Any
 
 import click
 
-from avow.backend_kit.programs.callbacks import SECOND, Driver, Event, Run, driver, unusable
+from avow.backend_kit.programs.callbacks import SECOND, Driver, Event, driver, unusable
+from avow.backend_kit.programs.compared import Compared, compared
 from avow.base.codec import document
 from avow.base.files import write_out
 from avow.base.workspace import system_folder
@@ -46,7 +47,8 @@ def command(
 
     It receives the messages that TRACE (JSON lines or a bag) has on its topics, or generated ones without TRACE. -o
     writes what it received and published, for `avow monitor` and as a trace of the plan. --replay compares its
-    publications with those of TRACE, topic by topic, in order and bit by bit; times are not compared.
+    publications with those of TRACE, topic by topic, in order and bit by bit; times are not compared, nor is
+    header.stamp where both are the clock's time: how many differ only in it is said.
 
     Code 1 if the class raises, or its publications differ from the recording; 2 if it uses a part of ROS that is not
     driven, or if what it publishes depends on a clock or on chance.
@@ -70,10 +72,13 @@ def command(
         write_out(output, "".join(f"{line}\n" for line in _lines(found, run.beside(events))))
     raised = run.raised
     different: tuple[str, ...] = ()
+    stamped: dict[str, int] = {}
     if replay and not raised:
         silent = not run.said and not any(event.topic in run.spoken for event, _ in recorded)
         nothing = "nothing was published, and nothing is recorded: there is nothing to compare"
-        different = (nothing,) if silent else tuple(_different(found, recorded, run))
+        judged = tuple(compared(recorded, run))
+        stamped = {each.topic: each.stamped for each in judged if each.stamped}
+        different = (nothing,) if silent else tuple(_different(found, judged))
     if as_json:
         told = {
             "node": node,
@@ -81,12 +86,14 @@ def command(
             "published": len(run.said),
             "raised": raised,
             "different": different,
+            "stamped": stamped,
         }
         click.echo(document(told))
     else:
+        stamps = [f"{topic}: {n} differ only in header.stamp, the clock's time" for topic, n in stamped.items()]
         same = ("the recording has the same",) if replay and not raised and not different else ()
         click.echo(f"{node}: {len(events)} messages heard, {len(run.said)} published")
-        for text in (*raised, *different, *same):
+        for text in (*raised, *different, *stamps, *same):
             click.echo(text)
     return 1 if raised or different else 0
 
@@ -120,14 +127,11 @@ def _lines(found: Driver, events: Iterable[Event]) -> Iterator[str]:
         yield f'{{"topic": {json.dumps(event.topic)}, "time": {whole}.{part:09d}{", " if rest else ""}{rest}}}'
 
 
-def _different(found: Driver, recorded: tuple[tuple[Event, Any], ...], run: Run) -> Iterator[str]:
+def _different(found: Driver, topics: Iterable[Compared]) -> Iterator[str]:
     """For each topic, the publications that differ from the recording, the first of them in full."""
 
-    for topic in sorted(run.spoken):
-        said = [event for event in run.said if event.topic == topic]
-        before = [raw for event, raw in recorded if event.topic == topic]
-        pairs = enumerate(zip(said, before, strict=False), start=1)
-        wrong = [(k, event, raw) for k, (event, raw) in pairs if not found.said_as(topic, event.data, raw)]
+    for each in topics:
+        topic, wrong = each.topic, each.different
         for number, event, raw in wrong[:DIFFERENCES]:
             there = json.dumps(
                 fields_of(raw), default=lambda part: part.decode() if isinstance(part, bytes) else str(part)
@@ -135,6 +139,6 @@ def _different(found: Driver, recorded: tuple[tuple[Event, Any], ...], run: Run)
             here = next(_lines(found, (event,)))
             yield f"{topic}: publication {number} is {here}, and was recorded as {there}"
         if len(wrong) > DIFFERENCES:
-            yield f"{topic}: {len(wrong)} publications differ, of {len(said)}; the last is {wrong[-1][0]}"
-        if len(said) != len(before):
-            yield f"{topic}: {len(said)} published, {len(before)} recorded"
+            yield f"{topic}: {len(wrong)} publications differ, of {each.said}; the last is {wrong[-1][0]}"
+        if each.said != each.recorded:
+            yield f"{topic}: {each.said} published, {each.recorded} recorded"

@@ -453,6 +453,47 @@ def test_a_bag_is_a_recording_too(tmp_path: Path, form: str) -> None:
     assert drive(folder, "watch", tmp_path / "made.jsonl", "--replay").return_value == 0
 
 
+STAMPS = [  # nanoseconds that the robot's stamps are later (None: all 0), a planted difference, the code
+    (3_000_000, False, 0),
+    (3_000_000, True, 1),
+    (3_000_000_000, False, 1),  # no clock's time
+    (None, False, 1),
+]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("later", "planted", "code"), STAMPS)
+def test_stamps_of_clocks_are_times(tmp_path: Path, later: int | None, planted: bool, code: int) -> None:
+    """Counted, and not compared; any other difference is shown alone."""
+    text = ROS2.replace("String\n", "String\nfrom own_msgs.msg import Stamped\n").replace("(String, ", "(Stamped, ")
+    made = "message = Stamped(data=self.level)\n        message.header.stamp = self.get_clock().now().to_msg()"
+    text = text.replace("self.said.publish(String(data=self.level))", f"{made}\n        self.said.publish(message)")
+    folder = system(tmp_path / "w", "rclpy", text)
+    (folder / "msg/own_msgs/msg").mkdir(parents=True)
+    (folder / "msg/own_msgs/msg/Stamped.msg").write_text("std_msgs/Header header\nstring data\n", encoding="utf-8")
+    contract = CONTRACT.replace("string status", "own_msgs/Stamped status")
+    (folder / "system.rcl").write_text(contract, encoding="utf-8")
+    plan = folder / "plan.yaml"
+    more = "    mapping: {out.status: data}\nmessages: [msg]\n"
+    plan.write_text(plan.read_text(encoding="utf-8") + more, encoding="utf-8")
+    recording = tmp_path / "recording.jsonl"
+    done = drive(folder, "watch", trace(tmp_path), "-o", recording)
+    assert done.return_value == 0, (done.output, done.exception)
+    events = [json.loads(line) for line in recording.read_text(encoding="utf-8").splitlines()]
+    said = [event for event in events if event["topic"] == "/status"]
+    for event in said:
+        stamp = event["header"]["stamp"]
+        at = stamp["sec"] * 10**9 + stamp["nanosec"] + later if later is not None else 0
+        event["header"]["stamp"] = dict(zip(("sec", "nanosec"), divmod(at, 10**9), strict=True))
+    said[1]["data"] = "other" if planted else said[1]["data"]
+    recording.write_text("".join(f"{json.dumps(event)}\n" for event in events), encoding="utf-8")
+    done = drive(folder, "watch", recording, "--replay")
+    assert done.return_value == code, (done.output, done.exception)
+    near = later is not None and later < 10**9
+    assert (f"/status: {4 - planted} differ only in header.stamp" in done.output) == near
+    assert done.output.count("/status: publication") == (planted if near else 4)
+
+
 @pytest.mark.slow
 def test_nothing_is_not_the_same(tmp_path: Path) -> None:
     silent = ROS1.replace("rospy.Timer(rospy.Duration(0.25), self.tick)", "pass")

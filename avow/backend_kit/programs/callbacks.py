@@ -147,16 +147,6 @@ class Driver:
         found: dict[str, Any] = shown(Nested(kind), event.data, self.known, self.source.kind)
         return found
 
-    def said_as(self, topic: str, data: Any, event: Mapping[str, Any]) -> bool:
-        """Whether a publication equals the recorded one in the recorded fields; a recording without fields matches
-        any."""
-        fields = fields_of(event)
-        if not fields and data["d"]:
-            return False
-        said = _plain_fields(data, fields)
-        recorded = self.coded(topic, event, "the recording")
-        return json.dumps(said) == json.dumps(_plain_fields(recorded, fields))
-
     def generated(self, messages: int, seed: int | str) -> Iterator[Event]:
         """So many messages on its subscriptions, made from the numbers and words of contract, program and
         parameters."""
@@ -405,15 +395,6 @@ def shown(wire: Wire, data: Any, known: Definitions, kind: Driving) -> Any:
             return int(data["i"])
         case Scalar(name=name):
             return float.fromhex(data["f"]) if name.startswith("float") else data
-
-
-def _plain_fields(data: Any, like: Any) -> Any:
-    """A message's data, restricted to the fields of a recorded event."""
-    if isinstance(like, dict) and isinstance(data, dict) and "d" in data:
-        return [[name, _plain_fields(value, like[name])] for name, value in data["d"] if name in like]
-    if isinstance(like, list) and isinstance(data, dict) and "l" in data and len(like) == len(data["l"]):
-        return [_plain_fields(item, each) for item, each in zip(data["l"], like, strict=True)]
-    return data
 
 
 def _words(sort: Any) -> tuple[str, ...]:
