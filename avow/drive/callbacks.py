@@ -115,7 +115,7 @@ class Driven:
     # -- missing parts -----------------------------------------------------------------------------------
 
     def refuse(self, what: str) -> NotDriven:
-        """The error is recorded, so that it is reported even if the class catches it; with its line and an alternative."""
+        """The error is recorded with its line, so that it is reported even if the class catches it."""
         instead = next((f"; instead: {text}" for end, text in INSTEAD.items() if what.endswith(end)), "")
         if what.startswith(("time.", "datetime.")) and not instead:
             instead = f"; instead: {'rospy.Time.now()' if self.kind == 'rospy' else 'get_clock().now()'}"

@@ -388,6 +388,36 @@ LOADED = [  # the first line of the file, and what is told if it cannot be loade
 ]
 
 
+@pytest.mark.parametrize(
+    ("kind", "distro", "wanted"),
+    [
+        ("rospy", "", "ros: {distro: noetic}"),
+        ("rclpy", "", "ros: {distro: humble}"),
+        ("rclpy", "jazzy", "jazzy has no such message"),
+    ],
+)
+def test_advice_on_a_missing_message_fits_the_plan(tmp_path: Path, kind: str, distro: str, wanted: str) -> None:
+    """A distribution is proposed only if the plan names none, and only one of the class's ROS."""
+    pytest.importorskip("rosbags")
+    folder = system(tmp_path / "w", kind, ROS1 if kind == "rospy" else ROS2)
+    contract = CONTRACT.replace("string status", "rover_msgs/Level status")
+    (folder / "system.rcl").write_text(contract, encoding="utf-8")
+    (folder / "msg/rover_msg/msg").mkdir(parents=True)
+    (folder / "msg/rover_msg/msg/Level.msg").write_text("string data\n", encoding="utf-8")
+    more = f"messages: [msg]\n{f'ros: {{distro: {distro}}}' if distro else ''}\n"
+    plan = folder / "plan.yaml"
+    plan.write_text(f"{plan.read_text(encoding='utf-8')}    mapping: {{out.status: data}}\n{more}", encoding="utf-8")
+    result = drive(folder, "watch")
+    assert isinstance(result.exception, Rejected), result.exception
+    (found,) = result.exception.diagnostics
+    assert found.code == "DRIVE101"
+    told_ = f"{found.message} {found.hint}"
+    assert wanted in told_
+    assert "did you mean `rover_msg/Level`?" in told_
+    assert "msg/rover_msgs/msg/Level.msg" in told_
+    assert ("distro:" in told_) == (not distro)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(("line", "why"), some(LOADED, 2))
 def test_a_file_that_cannot_be_loaded_has_its_own_line(tmp_path: Path, line: str, why: str) -> None:

@@ -17,7 +17,7 @@ from avow.backend_kit.programs.samples import Pool, leaves, numbers_of, pool, wr
 from avow.base.diagnostics import Diagnostic, Rejected, Severity
 from avow.base.files import inside, read_text
 from avow.base.process import ToolMissing
-from avow.base.suggestions import suggest
+from avow.base.suggestions import did_you_mean, suggest
 from avow.base.tuning.running import DRIVEN_CALLBACKS, DRIVEN_MEGABYTES, DRIVEN_SECONDS, LONGEST_GAP, NUMBERS_AGAIN
 from avow.isolation.observed import Seen
 from avow.language.contract import Node
@@ -211,7 +211,7 @@ def driver(system: System, name: str) -> Driver:
         "name": placed.name,
         "remaps": [list(pair) for pair in placed.remaps],
         "most": DRIVEN_CALLBACKS,
-        "messages": _messages(node, path, known, source.kind),
+        "messages": _messages(node, path, known, source.kind, plan.ros.distro),
     }
     subject = Subject(root, path, source.class_name, params, {}, (), ros)
     ((topics,), _) = _runs(source, subject, [((), 0, 0)], quiet=True)
@@ -275,7 +275,7 @@ def unusable(text: str) -> Rejected:
 # -- messages ------------------------------------------------------------------------------------------------
 
 
-def _messages(node: Node, file: Path, known: Definitions, kind: Driving) -> dict[str, Any]:
+def _messages(node: Node, file: Path, known: Definitions, kind: Driving, distro: str | None) -> dict[str, Any]:
     """The message types of the contract's topics and of the packages that the source's folder names, with their
     fields."""
     text = "".join(read_text(path, "utf-8", errors="replace") for path in sorted(file.parent.glob("*.py")))
@@ -291,8 +291,12 @@ def _messages(node: Node, file: Path, known: Definitions, kind: Driving) -> dict
         if name in found or name in _TIMES:
             continue
         if message is None:
-            hint = "messages: [msg]  names folders with definitions; ros: {distro: noetic}  a distribution's"
-            raise Rejected(Diagnostic("DRIVE101", f"nothing defines {name}", hint=hint))
+            hint = f"messages: [msg]  names folders: msg/{name.replace('/', '/msg/')}.msg defines it"
+            hint = f"{did_you_mean(name, known.messages) or ''} {hint}".strip()
+            if distro is None:
+                hint += f"; ros: {{distro: {'noetic' if kind is Driving.ROSPY else 'humble'}}}  names a distribution's"
+            text = f"nothing defines {name}{f', and {distro} has no such message' if distro else ''}"
+            raise Rejected(Diagnostic("DRIVE101", text, hint=hint))
         if any(inner.name in ("topic", "time") for inner in message.fields):
             text = f"{name} has a field that is called as a part of every recorded event: topic or time"
             raise Rejected(Diagnostic("DRIVE101", text))
