@@ -17,6 +17,7 @@ from avow.language.contract import ClauseKind
 
 from .pairing import EARLY, Asked, Choices, Pairing, ticks, time_of
 from .reading import Reader
+from .rules import of_latest
 from .tuning import BREACHES_IN_DOUBT, KEYS_KEPT
 from .watched import Answer, Fault, Part, Violation, Watched, open_verdict
 from .word import topics_of
@@ -211,7 +212,7 @@ def ask(
     pairing, now = monitor.pairing, time_of(event)
     missing = [n for n in watched.names if n not in monitor.paired and (n not in values or n in monitor.supposed)]
     if missing:
-        watched.tally.too_early(missing)
+        watched.tally.too_early(n for n in missing if n not in monitor.supposed)
         pairing.count(watched, ticks(now))
         return
     own = tuple(n for n in speaks(monitor, watched) if n in values)
@@ -229,16 +230,20 @@ def judge_answer(monitor: Monitor, asked: Asked, choices: Choices, found: list[V
     watched, tally = asked.watched, asked.watched.tally
     cases = choices if isinstance(choices, str) else pairing.cases(asked, choices)
     if cases == EARLY:
-        tally.too_early(watched.paired)
+        tally.too_early(name for name in asked.inputs if pairing.current(name, asked) == EARLY)
         return
     if isinstance(cases, str):
         tally.unsure(cases)
         return
-    tally.aged(asked.seconds, asked.since, watched.paired)
     verdicts = {monitor.verdict(watched, values) for values in cases}
     if len(verdicts) > 1:
         tally.unsure(DEPENDS)
         return
+    initial = (of_latest(monitor.setup.rules[name]) for name, places in asked.messages.items() if 0 in places)
+    if verdicts == {"held"} and monitor.doubts is None and any(initial):
+        tally.supposed += 1
+        return
+    tally.aged(asked.seconds, asked.since, watched.paired)
     tally.judged += 1
     tally.triggered = tally.triggered or all(watched.triggered(values) for values in cases)
     (verdict,) = verdicts

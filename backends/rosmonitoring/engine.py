@@ -109,6 +109,8 @@ class Monitor:
         self.word = word_of(self.setup, watched)
         if self.word is None and answers is not None and answers.by != "arrival":
             self.pairing = Pairing(answers)
+            if answers.by == "latency":
+                self.pairing.begins({n: v for n, v in self.values.items() if n in self.paired})
         else:
             self.so_far = SoFar(self.setup.leeway.jitter) if remembers(node) else None
         for clause in watched:

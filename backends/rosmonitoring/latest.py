@@ -181,8 +181,7 @@ class Doubts:
     def beginning(values: Mapping[str, Value]) -> Doubts:
         """`values`: those known before any message."""
         pairing = Pairing(Answers("latency", jitter=LIVE_APART))
-        for name, value in values.items():
-            pairing.saw(name, -1, -1.0, None, value, 0)
+        pairing.begins(values)
         return Doubts(pairing)
 
     def ask(self, monitor: Monitor, watched: Watched, values: Mapping[str, Value], event: Mapping[str, Any]) -> bool:

@@ -29,7 +29,7 @@ from . import observing
 from .pace import NO_TIME, RATE, By, Leeway, Rate, duration
 from .pairing import Answers
 from .reading import Undecided, from_text, shown
-from .rules import NOTHING_KNOWN, Choice, Constant, FieldPath, Fields, Previous, Rule, otherwise, told_only
+from .rules import NOTHING_KNOWN, Choice, Constant, FieldPath, Fields, Previous, Rule, of_latest, otherwise, told_only
 from .traces import carried
 from .tuning import DECIDED_SHARE
 from .wires import MappingError, parts_of, table_of, whole
@@ -204,6 +204,11 @@ class _Work:
         if not isinstance(entry, Mapping):
             return None
         by = str(entry.get("by", "latency"))
+        for name, rule in self.rules.items() if by not in ("arrival", "latency") else ():
+            known = isinstance(rule, Fields | Choice) and of_latest(rule) and rule.initial is not None
+            if known and name.startswith(f"{Role.INPUT}."):
+                text = f"by {by} it has no effect: an answer is judged with the message that it answered"
+                self.fault(text, name, "initial", hint="leave it out, or pair by `latency` or `arrival`")
         usual = {"stamp": ("header", "stamp"), "call": (CALL,)}.get(by, ())
         return Answers(
             by,

@@ -94,7 +94,9 @@ class Paired:
         for name in monitor.paired:
             known = pairing.seen.get(name)
             rows, codes = self._watch.known(name)
-            count, kept = known.count if known else 0, tuple(known.messages) if known and self._times.size else ()
+            count = known.count if known else 0
+            # `place` 0: an initial value, whose answers the engine judges
+            kept = [said for said in known.messages if said.place] if known and self._times.size else []
             ids = self._ids(self._watch.topic(name), pairing.answers.input, name, count) if len(rows) else NONE
             self._inputs[name] = _Input(
                 kept,

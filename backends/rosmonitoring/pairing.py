@@ -182,6 +182,11 @@ class Pairing:
         known.count += count
         return known
 
+    def begins(self, values: Mapping[str, Value]) -> None:
+        """The values before any message: at no time and no place, so that they have no age."""
+        for name, value in values.items():
+            self.passed_over(name, 0).messages.append(Said(-2 * LATEST_TIME * TICKS, math.inf, None, value, 0))
+
     def saw(
         self, name: str, time: Ticks, seconds: float, key: object, value: Value | Mapping[str, Any] | None, place: int
     ) -> Said:
@@ -270,7 +275,7 @@ class Pairing:
                 self.settled = max(self.settled or 0, asked.time + self.jitter)
             found: Choices = []
             for name in asked.inputs:
-                one = self._current(name, asked) if latency else self._same_key(name, asked)
+                one = self.current(name, asked) if latency else self._same_key(name, asked)
                 if isinstance(one, str):
                     found = one
                     break
@@ -326,7 +331,7 @@ class Pairing:
             said.value = self.readers[name](said.value, None)
         return said.value
 
-    def _current(self, name: str, asked: Asked) -> list[Said] | str:
+    def current(self, name: str, asked: Asked) -> list[Said] | str:
         start = asked.time - self.latency - self.jitter
         end = asked.time + self.jitter
         current: list[Said] = []

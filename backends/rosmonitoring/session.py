@@ -307,14 +307,6 @@ def session(
 
 
 def violation_json(violation: Violation) -> dict[str, Any]:
-    return {
-        "fault": violation.fault.name.lower(),
-        "node": violation.node,
-        "clause": violation.clause,
-        "event": violation.index,
-        "time": violation.time,
-        "bindings": dict(violation.bindings),
-        "values": dict(violation.values),
-        "explanation": violation.explanation,
-        "cause": violation.cause,
-    }
+    said = {name: getattr(violation, name) for name in ("node", "clause", "time", "explanation", "cause")}
+    known = {name: dict(getattr(violation, name)) for name in ("bindings", "values")}
+    return {"fault": violation.fault.name.lower(), "event": violation.index, **said, **known}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 from collections.abc import Callable
 from pathlib import Path
@@ -10,7 +11,9 @@ from typing import Any
 import pytest
 
 from avow.backend_kit.protocol import Limits
-from avow.backends.rosmonitoring import BACKEND
+from avow.backends.rosmonitoring import BACKEND, options
+from avow.backends.rosmonitoring.engine import Monitor
+from avow.backends.rosmonitoring.session import Session, session
 from avow.base.diagnostics import Rejected
 from avow.base.verdict import Outcome, Verdict
 from avow.system.plan import System
@@ -180,3 +183,58 @@ def test_times_that_do_not_go_on_are_no_evidence_for_seconds(
     assert plain.verdict is Verdict.MONITORED, plain
     assert timed.verdict is (Verdict.UNKNOWN if stands else Verdict.MONITORED), timed
     assert ("one time" in timed.summary) is stands
+
+
+PAIRINGS: list[dict[str, Any]] = [
+    {"by": "arrival", "because": "one process"},
+    {"latency": "20 ms", "jitter": "5 ms", "because": "measured"},
+    *(
+        {"by": by, **({"input": "id", "output": "id"} if by == "key" else {})}
+        for by in ("key", "stamp", "call", "order")
+    ),
+]
+
+
+@pytest.mark.parametrize("hold", [False, True])
+@pytest.mark.parametrize("answers", PAIRINGS)
+def test_an_initial_value_has_an_effect_or_is_refused(make_system: Make, answers: dict[str, Any], hold: bool) -> None:
+    """Answers before the first input are decided by it, those that break included; none that holds is evidence."""
+    system = make_system(ONE, {"in.r": {"field": "data", "initial": 130}, "out.v": "data"}, answers=answers)
+    setup, faults = options.setup(system, system.contract.node("n"), system.plan.node("n").methods[0].options)
+    if answers.get("by", "latency") not in ("arrival", "latency"):
+        assert [(fault.code, "it has no effect" in fault.message) for fault in faults] == [("MON101", True)]
+        return
+    assert not faults
+    early = [("v", 0.0 if hold else 1.0)] * 10
+    sent = [("r", 1.0), ("v", 5.0), ("r", 130.0), ("v", 0.0)] * 10
+    said = [{"topic": topic, "data": value, "time": k / 10} for k, (topic, value) in enumerate([*early, *sent])]
+    for batch in (False, True):
+        running = Session(system, (Monitor(setup),))
+        if batch:
+            lines = io.BytesIO("".join(f"{json.dumps(event)}\n" for event in said).encode())
+            found = [violation for _, violation in running.read(lines.read1)]
+        else:
+            found = [v for event in said for v in running.step(event)] + [*running.finish()]
+        ((*_, tally),) = running.clauses()
+        assert (tally.early, tally.order, tally.awaited) == (0, 0, {})
+        assert (tally.supposed, tally.broken, len(found)) == ((10, 0, 0) if hold else (0, 10, 10))
+        assert tally.decided - tally.broken == 20
+        assert all(age < 1 for age in tally.ages.values())
+
+
+def test_only_an_input_without_a_value_is_asked_for(make_system: Make) -> None:
+    rcl = """
+    node n {
+      inputs( a : REAL, b : REAL )  outputs( v : REAL )
+      topics( m/R a matches(in.a), m/R b matches(in.b), m/R v matches(out.v) )
+      guarantee sum ( out.v <= in.a + in.b )
+    }
+    """
+    for answers in PAIRINGS[:2]:
+        system = make_system(rcl, {"in.a": "data", "in.b": "data", "out.v": "data"}, answers=answers)
+        running = session(system, ("n",))
+        for k, topic in enumerate(["a", *["v"] * 10, "b", *["v"] * 10]):
+            assert not [*running.step({"topic": topic, "data": 0, "time": k / 10})]
+        assert not [*running.finish()]
+        ((*_, tally),) = running.clauses()
+        assert (tally.early, [*tally.awaited]) == (10, ["in.b"])

@@ -75,13 +75,7 @@ class Status:
     def message(self, system: str) -> dict[str, object]:
         """The fields of a `diagnostic_msgs/DiagnosticStatus`."""
         values = [{"key": key, "value": value} for key, value in self.values]
-        return {
-            "level": self.level,
-            "name": self.name,
-            "message": self.text,
-            "hardware_id": system,
-            "values": values,
-        }
+        return {"level": self.level, "name": self.name, "message": self.text, "hardware_id": system, "values": values}
 
 
 class Graph(Protocol):
