@@ -20,7 +20,7 @@ from avow.backend_kit.timeline import picture
 from avow.base.codec import document
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.plain import listed
-from avow.base.suggestions import did_you_mean
+from avow.base.suggestions import nearest
 from avow.base.workspace import system_folder
 from avow.ros.bags import digest_trace
 from avow.system.load import load_system
@@ -30,7 +30,7 @@ from .configuration import of_system
 from .engine import Monitor
 from .judged import Recorder, Telling
 from .lanes import Marks, signals, timeline
-from .observing import method_of
+from .observing import method_of, said
 from .options import origin
 from .session import Session, session, violation_json
 from .tuning import VIOLATIONS_SHOWN
@@ -138,10 +138,8 @@ def _configure(system: System, nodes: tuple[str, ...], path: Path) -> None:
     """Write ROSMonitoring's configuration. Raises Rejected."""
 
     setups = [monitor.setup for monitor in session(system, nodes).monitors]
-    options = [method_of(system, setup.node.name) for setup in setups]
-    parts = [(setup, {} if one is None else one.data) for setup, one in zip(setups, options, strict=True)]
-    _write(path, of_system(parts))
-    click.echo(f"{path}: {len(parts)} monitors")
+    _write(path, of_system([(setup, said(method_of(system, setup.node.name))) for setup in setups]))
+    click.echo(f"{path}: {len(setups)} monitors")
 
 
 def _live(
@@ -283,15 +281,16 @@ def _print_summary(running: Session) -> None:
         told = listed([f"{topic} ({count})" for topic, count in running.unheard.items()], 10)
         click.echo(f"topics of the trace that no clause speaks of, and their events: {told}")
         click.echo(f"topics listened to: {', '.join(running.topics) or 'none'}")
-        for topic in list(running.unheard)[:10]:
-            if meant := did_you_mean(topic, running.topics):
-                click.echo(f"  {topic}: {meant}")
+        for topic in dict.fromkeys(topic for monitor in running.monitors for topic in monitor.silent.values()):
+            meant = [f": did you mean `{name}`?" for name in nearest(topic, running.unheard, alike=0.75)]
+            click.echo("".join((f"  no message came on {topic}", *meant)))
     summary = [f"{count} × {fault}" for fault, count in running.counts.items()]
     if not any(True for _ in running.clauses()):
         summary.append("nothing was judged: write what a node promises in place of `to_write`")
     elif not _anything_judged(running):
         summary.append("nothing was judged: no clause ever had a value for all that it speaks of")
-    click.echo(f"{running.events} events: {', '.join(summary) or 'nothing broken'}")
+    fine = "nothing broken in what was decided" if unmonitored else "nothing broken"
+    click.echo(f"{running.events} events: {', '.join(summary) or fine}")
 
 
 def _serve(system: System, nodes: tuple[str, ...], port: int) -> None:

@@ -313,6 +313,11 @@ class Monitor:
             if names is None or names & set(self.carried(topic))
         ]
 
+    @property
+    def silent(self) -> dict[str, str]:
+        """The variables whose topic has had no message, and the topic."""
+        return {n: rule.topic for n, rule in self.setup.carried.items() if same_topic(rule.topic) not in self.heard}
+
     # -- for `columns`, which take over events that change only values -------------------------------------------------
 
     @property

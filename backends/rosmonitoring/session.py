@@ -196,7 +196,7 @@ class Session:
         """The clauses of monitored nodes for which too few publications were decided, each with a proposal for the
         plan, or the reason."""
         return {
-            f"{monitor.setup.node.name}.{name}": remedies(tally) or tally.reason
+            f"{monitor.setup.node.name}.{name}": remedies(tally, monitor.silent) or tally.reason
             for monitor, name, kind, tally in self.clauses()
             if monitor.setup.node.name in self.asked
             and not tally.hidden

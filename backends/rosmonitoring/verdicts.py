@@ -10,7 +10,6 @@ from avow.base.verdict import Counterexample, Outcome, Verdict
 
 from .engine import Monitor
 from .lanes import Marks, Signals
-from .options import same_topic
 from .tuning import VIOLATIONS_KEPT
 from .watched import Fault, Violation, coverage, old, remedies
 
@@ -176,7 +175,7 @@ def _never(s: Shown) -> Answer | None:
     if s.judged:
         return None
     monitors = [run.monitor for run in s.runs]
-    silent = sorted({t for monitor in monitors for t in monitor.setup.topics if same_topic(t) not in monitor.heard})
+    silent = sorted({topic for monitor in monitors for topic in monitor.silent.values()})
     heard = sorted({topic for monitor in monitors for topic in monitor.heard})
     topics = f": no message on {', '.join(silent)}; the traces have {', '.join(heard[:12]) or 'no topic'}"
     return Answer(Verdict.UNKNOWN, f"the traces never gave all the values that it speaks of{topics if silent else ''}")
@@ -187,7 +186,8 @@ def _unmonitored(s: Shown) -> Answer | None:
         return None
     text = f"unmonitored: {s.decided} of {s.asked} publications were decided ({s.lacking})"
     text += f": {'; '.join(s.reasons)}" if s.reasons else ""
-    wanted = "; ".join(dict.fromkeys(filter(None, map(remedies, s.tallies))))
+    found = (remedies(run.monitor.tallies[s.name], run.monitor.silent) for run in s.runs)
+    wanted = "; ".join(dict.fromkeys(filter(None, found)))
     return Answer(Verdict.UNKNOWN, f"{text}. {wanted}" if wanted else text)
 
 

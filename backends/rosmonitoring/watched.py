@@ -132,19 +132,20 @@ def coverage(tally: Tally) -> str:
     return f"published {tally.published} times" + (f": {told}" if told else "")
 
 
-def remedies(tally: Tally) -> str:
-    """Proposals for the plan, so that a clause of which too little was decided is monitored."""
+def remedies(tally: Tally, silent: Mapping[str, str]) -> str:
+    """Proposals for the plan, so that a clause of which too little was decided is monitored. `silent`: the variables
+    whose topic had no message: no initial value would help."""
     share = int(100 * tally.decided / tally.asked) / 100 if tally.asked else 0
-    late = ", ".join(tally.awaited)
-    first = (
-        f"{late} had no value when answers came (a latched topic, or a late publisher): say what it was "
-        f"before its first message, mapping: {{{next(iter(tally.awaited))}: {{…, initial: …}}}}"
-        if late
-        else ""
+    late = ", ".join(name for name in tally.awaited if name not in silent)
+    gone = ", ".join(dict.fromkeys(silent[name] for name in tally.awaited if name in silent))
+    said = f"say what it was before its first message, mapping: {{{late.partition(',')[0]}: {{…, initial: …}}}}"
+    parts = (
+        (gone, f"no message came on {gone}: correct the topic in the contract, or record it"),
+        (late, f"{late} had no value when answers came (a latched topic, or a late publisher): {said}"),
+        (tally.order and tally.unpaired, "pair answers with inputs by a stamp or a key (`answers`)"),
+        (LEAST_SHARE <= share < 1, f"say that less is enough, decided: {share:g}"),
     )
-    unpaired = "pair answers with inputs by a stamp or a key (`answers`)" if tally.order and tally.unpaired else ""
-    less = f"say that less is enough, decided: {share:g}" if LEAST_SHARE <= share < 1 else ""
-    return "; or ".join(part for part in (first, unpaired, less) if part)
+    return "; or ".join(words for applies, words in parts if applies)
 
 
 def old(ages: Mapping[str, float]) -> str:

@@ -12,6 +12,7 @@ import pytest
 
 from avow.backend_kit.protocol import Limits
 from avow.backends.rosmonitoring import BACKEND, options
+from avow.backends.rosmonitoring.command import _Output, _told
 from avow.backends.rosmonitoring.engine import Monitor
 from avow.backends.rosmonitoring.session import Session, session
 from avow.base.diagnostics import Rejected
@@ -238,3 +239,27 @@ def test_only_an_input_without_a_value_is_asked_for(make_system: Make) -> None:
         assert not [*running.finish()]
         ((*_, tally),) = running.clauses()
         assert (tally.early, [*tally.awaited]) == (10, ["in.b"])
+
+
+@pytest.mark.parametrize("answers", PAIRINGS[:2])
+@pytest.mark.parametrize(("sent", "meant"), [("/lvel", "`/lvel`"), ("/somewhere_else", "")])
+def test_a_topic_that_never_came_is_told_and_no_initial_value_advised(
+    make_system: Make,
+    capsys: pytest.CaptureFixture[str],
+    tmp_path: Path,
+    answers: dict[str, Any],
+    sent: str,
+    meant: str,
+) -> None:
+    rcl = ONE.replace("64 r ", "64 /level ").replace("64 v ", "64 /v ")
+    system = make_system(rcl, {"in.r": "data", "out.v": "data"}, answers=answers)
+    trace = tmp_path / "t.jsonl"
+    said = [{"topic": topic, "data": 0, "time": k / 10} for k, topic in enumerate([sent, "/v"] * 10)]
+    trace.write_text("".join(f"{json.dumps(event)}\n" for event in said), encoding="utf-8")
+    running = session(system, ("n",), trace)
+    assert _told(running, running.run(trace), str(trace), _Output(False, False, None, None)) == 1
+    told = capsys.readouterr().out
+    assert "initial" not in told
+    assert "n.g: no message came on /level: correct the topic in the contract, or record it" in told
+    assert f"  no message came on /level{': did you mean ' + meant + '?' if meant else ''}\n" in told
+    assert told.count("did you mean") == bool(meant)
