@@ -10,6 +10,7 @@ from itertools import combinations
 
 from avow.assurance.facts import Facts
 from avow.assurance.model import Currency, MethodInfo, ObligationView, Suggestion
+from avow.assurance.naming import short
 from avow.assurance.policy import Demand, Policy, asked_of, costs
 from avow.base.graphs import components
 from avow.base.persons import one_person
@@ -158,18 +159,17 @@ def _against_vacuity(view: ObligationView) -> str:
                 "assume less: an environment must be able to go on for ever, and each guarantee's trigger to come about"
             )
         case _:  # above all a guarantee
-            return "give the method inputs that meet the guarantee's trigger"
+            return f"give the method inputs that meet the trigger of {short(view.id)}"
 
 
 def suggest(view: ObligationView, demand: Demand | None, facts: Facts) -> Suggestion:
     """The cheapest step: repair what is wrong, run or install what is planned, else add a suitable method."""
     match view.status:
         case Status.REFUTED:
-            return Suggestion(
-                "repair what the counterexample shows, or accept the finding with a dated reason", cost=100
-            )
+            text = f"repair what the counterexample of {short(view.id)} shows, or accept it with a dated reason"
+            return Suggestion(text, cost=-1)  # what is wrong comes before what is lacking
         case Status.CONTRADICTORY:
-            return Suggestion(_two_answers(view), cost=100)
+            return Suggestion(f"{short(view.id)}: {_two_answers(view)}", cost=-1)
         case Status.ERROR:
             # the same job is not run again by itself: its input has to change, or the run be fresh
             again = f"`avow verify --fresh {facts.system}`"

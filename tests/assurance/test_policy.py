@@ -427,7 +427,7 @@ def test_two_answers_about_different_things_need_no_wrong_tool(read: str, said: 
     refutation = evidence("n.g", Verdict.REFUTED, "hypothesis", inputs={read: "1" * 64})
     suggestion = the_case("default", proof, refutation).obligations[0].suggestion
     assert suggestion is not None
-    assert suggestion.text.startswith(said)
+    assert suggestion.text.startswith(f"n.g: {said}")
 
 
 def test_a_method_that_gave_no_answer_is_seen_to_first() -> None:
@@ -521,6 +521,18 @@ def test_what_says_nothing_is_repaired_by_what_it_is(of: Obligation, word: str) 
     suggestion = next(v for v in found.obligations if v.id == of.id).suggestion
     assert suggestion is not None
     assert word in suggestion.text
+
+
+@pytest.mark.parametrize("lesser", [Verdict.TESTED, Verdict.UNKNOWN, Verdict.ERROR])
+def test_the_first_step_is_about_what_is_refuted_and_each_names_its_claim(lesser: Verdict) -> None:
+    subject = system({"n": ["broken", "lacking"]}, plans=[node_plan("n", "high", "hoare", "hypothesis")])
+    refuted = evidence("n.broken", Verdict.REFUTED, "hypothesis")
+    hollow = evidence("n.lacking", lesser, "hypothesis", vacuous=lesser is Verdict.TESTED)
+    found = case(subject, [guarantee("n", "broken"), guarantee("n", "lacking")], [refuted, hollow])
+    steps = [s.text for gate in found.gates for s in gate.suggestions if gate.id == "guarantees-high"]
+    assert steps[0].startswith("repair what the counterexample of n.broken shows")
+    if lesser is Verdict.TESTED:
+        assert steps[1] == "give the method inputs that meet the trigger of n.lacking"
 
 
 def test_a_requirement_that_says_nothing_is_red_though_a_person_accepts_it() -> None:
