@@ -19,7 +19,7 @@ from .pairing import EARLY, Asked, Choices, Pairing, ticks, time_of
 from .reading import Reader
 from .rules import of_latest
 from .tuning import BREACHES_IN_DOUBT, KEYS_KEPT
-from .watched import Answer, Fault, Part, Violation, Watched, open_verdict
+from .watched import DEPENDS, Answer, Fault, Part, Violation, Watched, open_verdict
 from .word import topics_of
 
 if TYPE_CHECKING:
@@ -257,9 +257,6 @@ def judge_answer(monitor: Monitor, asked: Asked, choices: Choices, found: list[V
             said += "; but an assumption does not hold"
         wrong = monitor.violation(verdict, watched.clause.name, asked.event, said, watched, cases[0])
         found.append(replace(wrong, index=asked.index, heard=asked.heard))
-
-
-DEPENDS = "it depends on which of its inputs the answer answered"
 
 
 def doubtful(monitor: Monitor, watched: Watched) -> bool:

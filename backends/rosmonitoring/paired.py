@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .answers import DEPENDS, asks, speaks
+from .answers import asks, speaks
 from .batch import NONE, UNREADABLE, Batch, Flags, Floats, Ints
 from .pairing import Pairing, Said, ticks_at
 from .tuning import COMBINATIONS, KEYS_KEPT, TICKS
-from .watched import Watched
+from .watched import DEPENDS, Watched
 
 if TYPE_CHECKING:
     from .columns import Watch

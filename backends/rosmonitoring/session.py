@@ -206,11 +206,8 @@ class Session:
     @property
     def topics(self) -> tuple[str, ...]:
         """The topics that the monitors listen to."""
-        found: dict[str, str] = {}
-        for monitor in self.monitors:
-            for topic in monitor.setup.topics:
-                found.setdefault(same_topic(topic), topic)
-        return tuple(found.values())
+        every = (topic for monitor in self.monitors for topic in monitor.setup.topics)
+        return tuple({same_topic(topic): topic for topic in every}.values())
 
     @property
     def kinds(self) -> dict[str, str]:

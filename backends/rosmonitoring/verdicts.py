@@ -83,6 +83,11 @@ class Shown:
         return "; ".join(dict.fromkeys(coverage(t) for t in self.tallies))
 
     @property
+    def wanted(self) -> str:
+        found = (remedies(run.monitor.tallies[self.name], run.monitor.silent) for run in self.runs)
+        return "; ".join(dict.fromkeys(filter(None, found)))
+
+    @property
     def held(self) -> str:
         return f"held at all {self.judged} judgements over {self.events} events"
 
@@ -186,9 +191,7 @@ def _unmonitored(s: Shown) -> Answer | None:
         return None
     text = f"unmonitored: {s.decided} of {s.asked} publications were decided ({s.lacking})"
     text += f": {'; '.join(s.reasons)}" if s.reasons else ""
-    found = (remedies(run.monitor.tallies[s.name], run.monitor.silent) for run in s.runs)
-    wanted = "; ".join(dict.fromkeys(filter(None, found)))
-    return Answer(Verdict.UNKNOWN, f"{text}. {wanted}" if wanted else text)
+    return Answer(Verdict.UNKNOWN, f"{text}. {s.wanted}" if s.wanted else text)
 
 
 def _unpaired(s: Shown) -> Answer | None:
@@ -208,6 +211,7 @@ def _monitored(s: Shown) -> Answer:
         (s.decided < s.published, f" ({s.lacking})"),
         (s.open_ends, f"; what it demands was open at the end of {s.open_ends} of {len(s.runs)} traces"),
         (s.vacuous, "; but its antecedent was never met"),
+        (s.vacuous and s.wanted, f" by an answer that was decided: {s.wanted}"),
     )
     text = (held if s.excused else s.held) + "".join(text for applies, text in parts if applies)
     return Answer(Verdict.MONITORED, text)

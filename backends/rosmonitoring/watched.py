@@ -132,6 +132,9 @@ def coverage(tally: Tally) -> str:
     return f"published {tally.published} times" + (f": {told}" if told else "")
 
 
+DEPENDS = "it depends on which of its inputs the answer answered"
+
+
 def remedies(tally: Tally, silent: Mapping[str, str]) -> str:
     """Proposals for the plan, so that a clause of which too little was decided is monitored. `silent`: the variables
     whose topic had no message: no initial value would help."""
@@ -143,7 +146,8 @@ def remedies(tally: Tally, silent: Mapping[str, str]) -> str:
         (gone, f"no message came on {gone}: correct the topic in the contract, or record it"),
         (late, f"{late} had no value when answers came (a latched topic, or a late publisher): {said}"),
         (tally.order and tally.unpaired, "pair answers with inputs by a stamp or a key (`answers`)"),
-        (LEAST_SHARE <= share < 1, f"say that less is enough, decided: {share:g}"),
+        (tally.reason == DEPENDS, "pair answers by a stamp or a key, or measure a shorter latency (`answers`)"),
+        (LEAST_SHARE <= share < 1 and tally.triggered, f"say that less is enough, decided: {share:g}"),
     )
     return "; or ".join(words for applies, words in parts if applies)
 

@@ -263,3 +263,21 @@ def test_a_topic_that_never_came_is_told_and_no_initial_value_advised(
     assert "n.g: no message came on /level: correct the topic in the contract, or record it" in told
     assert f"  no message came on /level{': did you mean ' + meant + '?' if meant else ''}\n" in told
     assert told.count("did you mean") == bool(meant)
+
+
+@pytest.mark.parametrize("decided", [None, 0.5])
+@pytest.mark.parametrize("others", [1, 3, 8])
+def test_no_share_is_advised_with_which_nothing_was_triggered(
+    make_system: Make, tmp_path: Path, decided: float | None, others: int
+) -> None:
+    """The only answers that meet the antecedent are undecided by latency: a lesser share would be vacuous."""
+    changes = [("r", k * 10.0, 1.0) for k in range(others)] + [("r", 90.0, 130.0)]
+    answers = [("v", at + 5, 0.0) for _, at, _ in changes[:-1]] + [("v", 90.005, 3.0)]
+    steps = sorted([*changes, *answers], key=lambda step: step[1])
+    trace = events(*((topic, value) for topic, _, value in steps), times=tuple(at for _, at, _ in steps))
+    more = {} if decided is None else {"decided": decided}
+    found = judged(make_system, tmp_path, ONE, trace, answers=PAIRINGS[1], **more)
+    assert found.verdict is (Verdict.UNKNOWN if decided is None else Verdict.MONITORED)
+    assert found.vacuous is (decided is not None)
+    assert "measure a shorter latency" in found.summary
+    assert "decided:" not in found.summary.replace("that was decided:", "")
