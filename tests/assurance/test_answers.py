@@ -185,8 +185,12 @@ def test_no_verdict_is_above_what_lies_below_it(listed: list[Evidence], said: li
         assert whole.tone.rank <= asked.tone.rank
         for hazard in by_method:
             method = hazard.hazard.id.removeprefix("H-")
+            taken = {r.obligation for r in listed if r.method == method}  # the guarantees that the method discharges
             said_so = {r.obligation for r in listed if r.method == method and r.verdict.supports}
-            assert not hazard.level.holds or (asked.level.holds and said_so >= {target.id for target in GUARANTEES})
+            if hazard.level.holds:
+                assert said_so == taken
+                assert {target.node for target in GUARANTEES if target.id in taken} == set(NODES)
+                assert asked.level.holds or taken != {target.id for target in GUARANTEES}
             late = any(a.expired and a.key.startswith(f"assumptions.{method}.") for a in found.assumptions)
             assert not (hazard.level.holds and late)
 

@@ -50,6 +50,7 @@ GIVEN = {
     "KEY": "my.key",
     "FILE": "contracts/thermostat/system.rcl",
     "FILE.csv": "requirements.csv",
+    "REPORT": "reports/thermostat",
     "OLD": "reports/thermostat",
     "NEW": "reports/thermostat",
     "A": "contracts/thermostat/system.rcl",

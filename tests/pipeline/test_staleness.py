@@ -86,7 +86,7 @@ TOGETHER = {(f"system/composition/chain.{part}", "compose") for part in ("persis
 CHAIN = {("system/composition/chain.pilot.one_berth", "compose"), *TOGETHER}
 SAFE = {("system/requirement/SAFE", "compose")}
 # whether what the plan assumes leaves room for every guarantee
-ROOM = {(f"system/composition/environment.{port}", "compose") for port in ("gauge.depth", "pilot.free")}
+ROOM = {(f"system/composition/environment.{port}", "compose") for port in ("gauge.depth", "gauge.wet", "pilot.free")}
 
 
 def guarantees(node: str, names: str, methods: str) -> set[tuple[str, str]]:
