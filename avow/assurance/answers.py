@@ -96,7 +96,7 @@ ABOUT = {
 """The topic of each sort of assumption, after a count: ``2 about the world``."""
 
 
-PLATFORM, MODELS, SAMPLES, RECORDINGS, START, TOOLS = GENERAL
+PLATFORM, MODELS, SAMPLES, RECORDINGS, START, REACTION, TOOLS = GENERAL
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from datetime import date
 
-from avow.assurance.answers import MODELS, PLATFORM, RECORDINGS, SAMPLES, START, TOOLS, Assumption, Sort
+from avow.assurance.answers import MODELS, PLATFORM, REACTION, RECORDINGS, SAMPLES, START, TOOLS, Assumption, Sort
 from avow.assurance.closure import Closed, used
 from avow.assurance.facts import Facts
 from avow.assurance.findings import takes
@@ -112,6 +112,7 @@ def assumptions(
         *_assumptions(facts, closed),
         *_of_evidence(views, relied, closed, statements),
         *_first_values(views, closed, statements),
+        *_reaction(facts, closed, statements),
         *_meaning(facts.requirements, statements),
     ]
     merged: dict[tuple[Sort, str], list[_Raw]] = {}
@@ -266,6 +267,21 @@ def _first_values(
 def _is_first_value(label: str) -> bool:
     """Whether a hypothesis is the plan's `initial`, and not a clause's state variable before the first step."""
     return label.startswith("initial ") and CELL not in label
+
+
+def _reaction(facts: Facts, closed: Mapping[str, Closed], statements: Statements) -> Iterator[_Raw]:
+    """A requirement is about steps in which each node has answered: if it speaks of more than one node, or rests on
+    more than one, nothing says how late a node, or a reaction from node to node, may be."""
+    kinds = {o.id: o for o in facts.obligations if o.kind is Kind.GUARANTEE}
+    said = statements.at(REACTION)
+    said = said if said.says else replace(said, says=GENERAL[REACTION])
+    for r in facts.requirements:
+        spoken = re.findall(r"(\w+)\.\w", f"{r.formula or ''} {r.temporal or ''}")
+        below = {kinds[claim].node for claim in closed[r.id].claims if claim in kinds}
+        nodes = [node.name for node in facts.nodes if node.name in below or node.name in spoken]
+        if len(nodes) > 1:
+            text = f"{r.id} is about steps in which each of {', '.join(nodes)} has answered"
+            yield _Raw(Sort.PLATFORM, REACTION, text, said, r.id, {r.id}.__contains__)
 
 
 def _meaning(requirements: Sequence[Requirement], statements: Statements) -> Iterator[_Raw]:

@@ -258,7 +258,6 @@ def not_shown(
             "A proof or check is about the program or model that it was given; that the deployed software is that "
             "program, on that hardware, is not shown."
         )
-    lines.append("Timing, lost or reordered messages, and failures of hardware are outside of contracts over one step.")
     lines.append(
         "That the contracts say what was meant, and that the requirements are the right ones, is for people to judge."
     )

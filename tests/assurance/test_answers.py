@@ -14,7 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from assurance.sample import TODAY, case, evidence, guarantee, node_plan, obligation, rover_case, system
-from avow.assurance.answers import ABOUT, MEANINGS, PLATFORM, START, TOOLS, Assumption, Level, Sort, Tone
+from avow.assurance.answers import ABOUT, MEANINGS, PLATFORM, REACTION, START, TOOLS, Assumption, Level, Sort, Tone
 from avow.assurance.case import as_of, conclude_again
 from avow.assurance.changes import KINDS, baseline_of
 from avow.assurance.deficits import _WORDS
@@ -32,7 +32,7 @@ GUARANTEES = [guarantee(node, name) for node, names in NODES.items() for name in
 METHODS = {"hoare": Verdict.PROVED, "ajpf": Verdict.CHECKED, "hypothesis": Verdict.TESTED, "review": Verdict.REVIEWED}
 HYPOTHESES = ("the map is true", "the runs are drawn", "the table fits")
 OWNED, LATE, NOBODY = ("somebody", "2030-01-01"), ("somebody", "2020-01-01"), ("", "")
-ALWAYS = [Statement(place, "It is so", "", *OWNED) for place in (PLATFORM, TOOLS)]
+ALWAYS = [Statement(place, "It is so", "", *OWNED) for place in (PLATFORM, REACTION, TOOLS)]
 PLANS = [node_plan(node, "low", *METHODS) for node in NODES]
 PROSE = Requirement("R", "It is safe.", None, None, ("a", "b"))
 FORMAL = Requirement("R", "It is safe.", "a.x > 0", None, ("a", "b"))

@@ -111,5 +111,30 @@ def test_a_proof_from_first_values_rests_on_the_plans_words_for_them(needed: lis
     assert ("Each delayed input begins with the first value that the plan gives" in _words(found)) is named
 
 
+@pytest.mark.parametrize(
+    ("formula", "supported_by", "named"),
+    [
+        ("n.o", ("n",), False),
+        ("n.o -> m.o", ("n",), True),  # a reaction from one node to another, also if one guarantee is enough
+        ("n.o", ("n", "m"), True),
+        (None, ("n", "m"), True),  # in prose, over the same nodes
+        (None, ("m",), False),
+    ],
+)
+def test_a_requirement_over_several_nodes_rests_on_answers_in_time(
+    formula: str | None, supported_by: tuple[str, ...], named: bool
+) -> None:
+    requirement = Requirement("R", "It holds", formula, None, supported_by)
+    goals = [obligation(node, Kind.GUARANTEE, "g") for node in ("n", "m")]
+    asked = obligation("system", Kind.REQUIREMENT, "R")
+    proof = evidence(asked, Verdict.PROVED, "compose", details={"needed": [f"{node}.g" for node in supported_by]})
+    plans = [node_plan(node, "medium", "hoare") for node in ("n", "m")]
+    whole = system({"n": ["g"], "m": ["g"]}, plans=plans, requirements=[requirement])
+    found = case(whole, [*goals, *([asked] if formula else [])], [proof] if formula else [])
+    about = [a for a in found.assumptions if a.key == "assumptions.platform.reaction"]
+    assert [a.words for a in about] == ["Each node answers in time, and a reaction takes no time between nodes"] * named
+    assert all(a.needed_by == ("R",) and a.sort == "the platform" for a in about)
+
+
 def _words(found: Case) -> list[str]:
     return [a.words for a in found.assumptions]
