@@ -89,12 +89,9 @@ def identified(case: Case, name: str) -> Iterator[Told]:
         yield f"run {name}", [f"begun {case.run.started}, {case.run.seconds:g} s, Avow {case.run.avow_version}"]
     if name == case.system:
         yield f"system {name}", [case.title, case.answers.told, case.answers.beside]
-    for level, meaning in answers.MEANINGS.items():
-        if name == level:
-            yield f"the word {level}", [meaning]
-    for status in Status:
-        if name in (status.value, status.value):
-            yield f"the word {status.value}", [MEANINGS[status]]
+    words = {s.value: MEANINGS[s] for s in Status} | {str(level): told for level, told in answers.MEANINGS.items()}
+    if name in words:
+        yield f"the word {name}", [words[name]]
 
 
 def entries(case: Case) -> Iterator[Entry]:

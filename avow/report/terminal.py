@@ -6,6 +6,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from avow.assurance.answers import MEANINGS as LEVELS
 from avow.assurance.model import Case, ObligationView
 from avow.assurance.naming import short
 from avow.base.verdict import Counterexample, in_words
@@ -24,17 +25,22 @@ from avow.report.wording import (
     where,
 )
 
-_COLOURS = {"good": "green", "fair": "blue", "open": "yellow", "bad": "red"}
+_COLOURS = {"good": "green", "fair": "blue", "open": "yellow", "bad": "red", "amber": "yellow", "grey": "dim"}
 
 
 def show_obligation(case: Case, view: ObligationView, console: Console | None = None) -> None:
     """Print everything known about an obligation."""
     out = console or Console(highlight=False)
     o = view.obligation
-    out.print(f"[bold]{escape(view.id)}[/]   {_status(view.standing)} [dim]{MEANINGS[view.standing]}[/]")
+    required = next((r for r in case.requirements if view.id in r.obligations), None)
+    stands, meaning, formula = _status(view.standing), MEANINGS[view.standing], o.formula
+    if required is not None:  # a requirement has one verdict, and its formula in the plan's words
+        stands = f"[{_COLOURS.get(required.tone, required.tone)}]{required.tone.mark} {required.level}[/]"
+        meaning, formula = LEVELS[required.level], required.formal
+    out.print(f"[bold]{escape(view.id)}[/]   {stands} [dim]{meaning}[/]")
     out.print(escape(o.claim))
-    if o.formula:
-        out.print("\n" + "\n".join(f"    {escape(line)}" for line in in_lines(o.formula).splitlines()) + "\n")
+    if formula:
+        out.print("\n" + "\n".join(f"    {escape(line)}" for line in in_lines(formula).splitlines()) + "\n")
     said = case.said(view.id)
     if said:
         by = f" by {escape(said.who)}" if said.who else ""

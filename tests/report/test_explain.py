@@ -13,6 +13,7 @@ import pytest
 from assurance.sample import case, evidence, guarantee, obligation, rover_case, system
 from rich.console import Console
 
+from avow.assurance.answers import MEANINGS as LEVELS
 from avow.assurance.codec import read_case
 from avow.assurance.model import Case
 from avow.assurance.naming import short
@@ -21,10 +22,12 @@ from avow.base.verdict import Counterexample, Verdict
 from avow.cli.explain import find_claim
 from avow.evidence.ledger import Ledger
 from avow.evidence.obligation import Kind
+from avow.evidence.status import Status
 from avow.report import formats
 from avow.report.explained import explained, left_out
 from avow.report.terminal import show_obligation
-from avow.system.plan import Finding
+from avow.report.wording import MEANINGS
+from avow.system.plan import Finding, Requirement
 from report.test_answers_page import REPORTS
 
 PAGES = ("index.html", "argument.html", "claims.html", "system.html", "contracts.html", "traceability.html")
@@ -56,6 +59,23 @@ def test_an_accepted_refutation_says_who_and_until_when() -> None:
 
 def test_a_long_formula_is_in_lines() -> None:
     assert max(len(line) for line in shown("not-redundant").splitlines()) <= 100
+
+
+@pytest.mark.parametrize("verdict", [Verdict.PROVED, Verdict.UNKNOWN, Verdict.REFUTED])
+@pytest.mark.parametrize("below", [Verdict.PROVED, Verdict.TESTED, Verdict.JUSTIFIED, Verdict.REFUTED])
+def test_a_requirement_has_one_status_and_the_plans_formula(verdict: Verdict, below: Verdict) -> None:
+    asked, target = obligation("system", Kind.REQUIREMENT, "R", "It holds", "m.o > 0"), guarantee("n", "g")
+    proof = evidence(asked, verdict, "compose", details={"needed": ["n.g"]})
+    required = Requirement("R", "It holds", "n.in_o > 0", None, ("n.g",))
+    whole = system({"n": ["g"]}, requirements=[required])
+    found = case(whole, (target, asked), [evidence(target, below, "hoare"), proof])
+    out = StringIO()
+    show_obligation(found, found.obligations[1], Console(file=out, width=200, highlight=False))
+    told = out.getvalue().split("\n\n")
+    level = found.requirements[0].level
+    assert f"{found.requirements[0].tone.mark} {level} {LEVELS[level]}" in told[0]
+    assert not any(MEANINGS[status] in told[0] for status in Status)
+    assert told[1].strip() == "n.in_o > 0"
 
 
 def run_of_an_agent(width: int) -> str:
