@@ -166,8 +166,9 @@ def suggest(view: ObligationView, demand: Demand | None, facts: Facts) -> Sugges
     """The cheapest step: repair what is wrong, run or install what is planned, else add a suitable method."""
     match view.status:
         case Status.REFUTED:
+            known = next((str(r.details["next"]) for r in view.records if "next" in r.details), "")
             text = f"repair what the counterexample of {short(view.id)} shows, or accept it with a dated reason"
-            return Suggestion(text, cost=-1)  # what is wrong comes before what is lacking
+            return Suggestion(known or text, cost=-1)  # what is wrong comes before what is lacking
         case Status.CONTRADICTORY:
             return Suggestion(f"{short(view.id)}: {_two_answers(view)}", cost=-1)
         case Status.ERROR:

@@ -27,6 +27,7 @@ from avow.language.subterms import ports_of
 from avow.sanity.claims import triggers
 from avow.solving.questions import solve
 from avow.solving.sizes import in_every_size
+from avow.system.graph import to_delay
 
 
 @dataclass(frozen=True, slots=True)
@@ -303,7 +304,7 @@ class StartQuestion:
                 Verdict.REFUTED,
                 f"{summary}; declare an edge delayed, with an initial value",
                 Counterexample(explanation=summary),
-                details={"cycles": [list(cycle) for cycle in stuck]},
+                details={"cycles": [list(cycle) for cycle in stuck], "next": to_delay(stuck[0], graph.edges)},
             )
         initials = composition.frame.initials(frozenset(self.members))
         solution = solve(initials, effort=bounds.effort, seed=bounds.seed)

@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, assert_never
 
+from avow.base.graphs import components, cycles_in
 from avow.base.tuning.shown import DRAFTED_FIELDS, DRAFTED_WORDS
 from avow.ros.bags import message_of
 from avow.ros.calls import is_part, named
@@ -310,7 +311,7 @@ class _Draft:
             lines += ["", "model:", f"  graph: {given.graph}"]
             if dropped:
                 lines += ["  dropped:", *(f"    {json.dumps(name)}: {why}" for name, why in dropped.items())]
-        lines += ["", *self.environment(nodes), "nodes:"]
+        lines += ["", *self.environment(nodes), *self.loops(nodes), "nodes:"]
         for name, node in nodes.items():
             lines += self.methods(name, node)
         return "\n".join([*lines, ""])
@@ -326,6 +327,21 @@ class _Draft:
             *(f'#   in.{name}: {{assume: "…", because: "…"}}  # {topic}' for topic, name in ports),
             "",
         ]
+
+    def loops(self, nodes: Mapping[str, Listed]) -> list[str]:
+        """For each loop the connection to delay: a person says what was there before the first step."""
+        heard = {t: [n for n, x in nodes.items() if t in x.subscribes] for t, ports in self.ports.items() if ports}
+        carried: dict[tuple[str, str], list[str]] = {}
+        for name, node in nodes.items():
+            for topic, other in ((t, b) for t in node.publishes for b in heard.get(t, ()) if b != name):
+                carried.setdefault((name, other), []).append(topic)
+        backs = [(cycle[-1], cycle[0]) for part in components(nodes, carried) for cycle in cycles_in(part, carried)]
+        said = ((a, p.name, b, topic) for a, b in backs for topic in carried[a, b] for p in self.ports[topic])
+        lines = [
+            f"#   - {{from: {a}.{p}, to: {b}.{p}, delayed: true, initial: …}}  # {topic}" for a, p, b, topic in said
+        ]
+        head = "# connections:                         # in a loop: say what was there before the first step"
+        return [head, *lines, ""] if lines else []
 
     def methods(self, name: str, node: Listed) -> list[str]:
         sides = (("in", node.subscribes), ("out", node.publishes))

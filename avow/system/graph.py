@@ -294,11 +294,17 @@ def _several(target: Endpoint, names: list[str], port: Port) -> Diagnostic:
     return Diagnostic("PLAN122", message, port.span, hint=hint)
 
 
+def to_delay(cycle: tuple[str, ...], edges: Sequence[Edge]) -> str:
+    """What to write in the plan so that something comes first in a loop: the fewest connections that need it."""
+    arcs = zip(cycle, (*cycle[1:], cycle[0]), strict=True)
+    open_ = [e for e in edges if not (e.delayed and e.initial is not None)]
+    ways = [[e for e in open_ if (e.source.node, e.target.node) == arc] for arc in arcs]
+    way = min(reversed(ways), key=lambda way: sum(1 if e.delayed else 2 for e in way))
+    told = (f"{{from: {e.source}, to: {e.target}, delayed: true, initial: …}}" for e in way)
+    return f"say what was there before the first step, for example  connections: [{', '.join(told)}]"
+
+
 def _deadlock(cycle: tuple[str, ...], edges: Sequence[Edge], spans: Mapping[str, Span | None]) -> Diagnostic:
     shown = " → ".join((*cycle, cycle[0]))
-    delayed = any(e.delayed and e.source.node in cycle and e.target.node in cycle for e in edges)
     message = f"start-up deadlock: {shown} wait for one another and nothing comes first"
-    hint = (
-        "give the delayed edge an initial value" if delayed else "declare an edge of it delayed, with an initial value"
-    )
-    return Diagnostic("PLAN123", message, spans.get(cycle[0]), Severity.WARNING, hint)
+    return Diagnostic("PLAN123", message, spans.get(cycle[0]), Severity.WARNING, to_delay(cycle, edges))

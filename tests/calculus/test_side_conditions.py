@@ -89,6 +89,7 @@ def test_a_circular_assumption_is_refused_with_its_cycle(tmp_path: Path) -> None
     assert "circular" in found["whole.a.A1"].summary
     assert "a → b → a" in found["whole.loop.a-b"].summary
     assert found["start.a-b"].verdict is Verdict.REFUTED
+    assert "{from: b.y, to: a.y, delayed: true, initial: …}" in str(found["start.a-b"].details["next"])
 
 
 def test_a_delay_with_a_good_first_value_makes_it_well_founded(tmp_path: Path) -> None:

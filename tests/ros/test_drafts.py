@@ -185,6 +185,29 @@ def test_names_of_a_graph_are_data(tmp_path: Path) -> None:
     assert [p.name for p in loaded.contract.nodes[0].outputs] == ["in_", "REAL_"]
 
 
+@pytest.mark.parametrize("length", [2, 3, 5])
+def test_a_loop_is_drafted_with_the_connection_to_delay(length: int, tmp_path: Path) -> None:
+    """Until then the plan's warning says the same; with a first value nothing waits for anything."""
+    ring = {
+        f"/n{k}": {
+            "publishers": {f"/t{k}": "std_msgs/Bool", f"/u{k}": "std_msgs/Bool"},
+            "subscribers": {f"/t{(k - 1) % length}": "std_msgs/Bool", f"/t{k}": "std_msgs/Bool"},
+        }
+        for k in range(length)
+    }
+    (tmp_path / "g.json").write_text(json.dumps(ring), encoding="utf-8")
+    folder = run(tmp_path / "w", "--from-graph", str(tmp_path / "g.json"), "--distro", "noetic")
+    plan = (folder / "plan.yaml").read_text(encoding="utf-8")
+    (stuck,) = dataflow(load_system(folder)).findings
+    drafted = re.findall(r"^#   - (\{from: .*\})  #", plan, re.MULTILINE)
+    last = length - 1
+    assert drafted == [f"{{from: n{last}.t{last}, to: n0.t{last}, delayed: true, initial: …}}"]
+    assert (stuck.code, f"connections: [{drafted[0]}]" in (stuck.hint or "")) == ("PLAN123", True)
+    text = re.sub("^# (connections:|  - )", r"\1", plan.replace("initial: …", "initial: false"), flags=re.MULTILINE)
+    (folder / "plan.yaml").write_text(text, encoding="utf-8")
+    assert dataflow(load_system(folder)).findings == ()
+
+
 CALLS = """\
 /gripper
   Service Servers:
