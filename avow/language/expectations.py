@@ -133,6 +133,8 @@ def _in_formula(
             return OPERATORS[word.text.lower()]
     if found.type == "NOT" and after is not None and after.type in ("IN", "EQ", "EQUALS"):
         return "write `!in`" if after.type == "IN" else "write `!=`"
+    if found.type == "NAME" and before is not None and before.type == "NUMBER":
+        return f"only times have units (`500 ms`): write the number in the port's own unit, without `{found.text}`"
     if _in_quantifier(earlier, found, expected):
         return _QUANTIFIER
     begins = before is None or before.type in _CONNECTIVES | {"LPAR"}

@@ -106,6 +106,19 @@ def test_messages(formula: str, message: str) -> None:
     assert any(re.search(message, line) for line in found), found
 
 
+@pytest.mark.parametrize("number", ["1500", "1.5", "-2", "0"])
+@pytest.mark.parametrize("unit", ["mm", "m", "kg", "percent"])
+@pytest.mark.parametrize(
+    "formula", ["in.v < %s", "%s > in.v", "in.v < %s and in.v > 0", "in.v < %s/s", "(in.v - %s) < 1"]
+)
+def test_a_number_has_no_unit(number: str, unit: str, formula: str) -> None:
+    text = "node n { inputs( v : REAL ) outputs( b : BOOL ) topics() guarantee g ( %s ) }"
+    faults = [d for d in check_text(text % (formula % f"{number} {unit}"), "f")[1] if d.is_error]
+    assert [d.hint for d in faults] == [
+        f"only times have units (`500 ms`): write the number in the port's own unit, without `{unit}`"
+    ]
+
+
 def test_all_errors_of_a_file_in_one_run() -> None:
     text = """\
 context { A : {a, b}; B : ; C : {c} D : Missing; }
