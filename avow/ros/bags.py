@@ -223,13 +223,13 @@ def _readable(path: Path) -> Iterator[None]:
 
     try:
         yield
-    except (AnyReaderError, SerdeError) as error:
-        hint = None
-        if "type definition" in str(error):
+    except (AnyReaderError, SerdeError, OSError, ValueError, KeyError, RuntimeError, TypesysError) as error:
+        why, hint = str(error), None
+        if "type definition" in why:
             hint = "the bag holds no definitions: name the distribution, `ros: {distro: humble}`, and `messages:`"
-        raise NoBag(f"{path} is no bag that can be read: {error}", hint) from None
-    except (OSError, ValueError, KeyError, RuntimeError, TypesysError) as error:
-        raise NoBag(f"{path} cannot be read as a bag: {error}") from None
+        if path.is_dir() and not (path / "metadata.yaml").exists():
+            why, hint = "its folder has no metadata.yaml", f"`ros2 bag reindex {path}` writes it from the recorded files"
+        raise NoBag(f"{path} cannot be read as a bag: {why}", hint) from None
 
 
 def _reader(kind: Any, path: Path, origin: Origin) -> Any:

@@ -167,6 +167,17 @@ def test_within_a_workspace_only_the_system_is_made(tmp_path: Path) -> None:
     assert not (folder / "dodo.py").exists()
 
 
+@pytest.mark.parametrize("form", ["sqlite3", "mcap"])
+def test_a_bag_without_its_metadata_wants_it(form: str, tmp_path: Path) -> None:
+    bag = make_bag(tmp_path / "run", form)
+    (bag / "metadata.yaml").unlink()
+    with pytest.raises(Rejected) as caught:
+        CliRunner().invoke(init, [str(tmp_path / "w"), "--from-bag", str(bag)], catch_exceptions=False)
+    (fault,) = caught.value.diagnostics
+    assert "its folder has no metadata.yaml" in fault.message
+    assert f"ros2 bag reindex {bag}" in (fault.hint or "")
+
+
 @pytest.mark.parametrize("text", ["", "a -> b", "/a\n  Publishers:\n", '{"/a": {"publishers": {"/t\\nx": "a/B"}}}'])
 def test_what_is_no_graph_drafts_nothing(tmp_path: Path, text: str) -> None:
     (tmp_path / "graph.txt").write_text(text, encoding="utf-8")
