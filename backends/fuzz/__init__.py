@@ -21,7 +21,7 @@ class FuzzBackend(Backend):
 
     name = "fuzz"
     title = "libFuzzer with sanitizers on the node's C++ source; kept runs judged against the contract"
-    version = "3"
+    version = "4"
     strength = Verdict.TESTED
     link = Link.GENERATED
     of = Object.BINARY

@@ -178,7 +178,8 @@ def campaign(asked: Campaign, question: Question) -> Campaigned:
     words = said.split()
     closed = len(words) == 3 and said.endswith("\n") and words[0] == nonce
     done = closed and words[1] == "done" and code == 0
-    fault = "the source left processes behind" if left and level is not Isolation.SEALED else ""
+    # a report of a sanitizer leaves its symbolizer behind; the run that it is about is judged by itself
+    fault = "the source left processes behind" if left and code == 0 and level is not Isolation.SEALED else ""
     if closed and words[1] == "left":
         fault = fault or "the source ended the process within a step"
     return Campaigned(code, int(words[2]) if done and words[2].isdigit() else 0, fault, printed, level)

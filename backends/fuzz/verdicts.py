@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator, Mapping, Sequence
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 from avow.backend_kit.linked import Recorded, settled
 from avow.backend_kit.programs.judging import Formula, NoValue, Seen, exact, returned, seen, started, triggers
 from avow.backend_kit.programs.samples import as_single, next_single
+from avow.base.suggestions import did_you_mean
 from avow.base.verdict import Counterexample, Hypothesis, HypothesisKind, Outcome, Verdict
 from avow.drive.steps import coded, plain
 from avow.evidence.obligation import Obligation, ProgramClaim
@@ -152,7 +154,7 @@ class Bench:
             if answer is None and not reply.crash:
                 return
             if answer is not None and "misuse" in answer:
-                raise Misused(f"the adapter does not fit the contract: {answer['why']}")
+                raise self._misfit(answer["why"])
             if answer is not None and "before" in answer:
                 held = self._held(answer, "before")
             case = {**step, **held}
@@ -188,11 +190,12 @@ class Bench:
 
     def _held(self, answer: Mapping[str, Any], key: str) -> dict[str, Any]:
         if "misuse" in answer:
-            raise Misused(f"the adapter does not fit the contract: {answer['why']}")
+            raise self._misfit(answer["why"])
         data = answer.get(key)
         if not isinstance(data, dict) or set(data) != self.reading.memory:
             names = ", ".join(sorted(self.reading.memory)) or "nothing"
             raise Misused(f"memory() of the adapter has to give {names}")
+        self._of_types(data.items(), {p.name: p.sort for p in self.reading.node.inputs})
         return {name: plain(value) for name, value in data.items()}
 
     def _fits(self, answer: Mapping[str, Any]) -> None:
@@ -201,18 +204,41 @@ class Bench:
         given = {name for name, _ in answer["value"]["d"]}
         if given != names:
             missing, extra = sorted(names - given), sorted(given - names)
-            said = [f"lacks {', '.join(missing)}"] if missing else []
-            said += [f"has {', '.join(extra)}, which is no output"] if extra else []
-            raise Misused(f"what the adapter gives {' and '.join(said)}")
+            said = [f"has {', '.join(f'`{name}`' for name in extra)}, which is no output"] if extra else []
+            said += [f"lacks {', '.join(missing)}"] if missing else []
+            raise self._misfit(f"what it gives {' and '.join(said)}", names)
         sorts = {p.name: p.sort for p in self.reading.node.outputs}
-        odd = [
-            name for name, data in (*answer["value"]["d"], *answer["memory"].items()) if not _of(data, sorts.get(name))
-        ]
-        if odd:
-            raise Misused(f"the adapter gives {odd[0]} as another type than the contract's")
+        self._of_types((*answer["value"]["d"], *answer["memory"].items()), sorts)
         wide = [name for name, data in answer["value"]["d"] if self.reading.single and not _single(data)]
         if wide:
             raise Misused(f"the adapter gives {wide[0]} as a double that is no float: numbers: float32")
+
+    def _of_types(self, given: Iterable[tuple[str, Any]], sorts: Mapping[str, s.Sort]) -> None:
+        """Raises Misused where a value is not of its port's type, or no element of it."""
+        for name, data in given:
+            sort = sorts.get(name)
+            if not _of(data, sort):
+                raise self._misfit(f"it gives `{name}` as another type than the contract's")
+            sort = sort.item if isinstance(sort, s.SequenceSort) else sort
+            if isinstance(sort, s.EnumSort):
+                for element in data["l"] if isinstance(data, dict) else (data,):
+                    if element not in sort.members:
+                        raise self._misfit(
+                            f"it gives `{element}` for {name}, whose type has no such element", sort.members
+                        )
+
+    def _misfit(self, said: str, known: Iterable[str] = ()) -> Misused:
+        """What the adapter has wrong: where, and the name that was probably meant by one that is not known."""
+        reading = self.reading
+        name = found[1] if (found := re.search("`([^`]*)`", said)) else ""
+        ports = (*reading.node.inputs, *reading.node.outputs)
+        names = {*known} or {*reading.params, *(port.name for port in ports)}
+        hint = did_you_mean(name, names) if name and name not in names else None
+        lines = reading.adapter.read_text(encoding="utf-8", errors="replace").splitlines()
+        line = next((f":{at}" for at, text in enumerate(lines, 1) if f'"{name}"' in text), "")
+        why = said.removeprefix("the adapter: ")
+        place = f"{reading.source.cpp}{line}"
+        return Misused(f"{place}: the adapter does not fit the contract: {why}{f': {hint}' if hint else ''}")
 
     def _allowed(self, case: Mapping[str, Any]) -> bool | None:
         node = self.reading.node
@@ -273,6 +299,8 @@ class Bench:
             case = {**zero, **self._held(answers[0], "held")} if answers else zero
             if not self._allowed(case):
                 continue
+            if answer is not None and "error" not in answer:
+                self._fits(answer)
             if answer is None:
                 step = Seen({f"in.{k}": exact(v) for k, v in case.items()}, f"the program ends with {reply.crash}")
             else:

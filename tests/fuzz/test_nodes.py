@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -162,18 +163,29 @@ def test_no_numbers_refute_where_they_are_possible(tmp_path: Path) -> None:
 
 
 MISFITS = {
-    'out.truth("u", true);': "has to give",
-    "": "lacks u",
-    'out.real("u", in.real("w"));': "there is no w",
-    'out.real("u", 1); out.real("w", 1);': "no output",
+    'out.element("light", "red"); out.truth("speed", true);': "it gives `speed` as another type",
+    'out.element("light", "red");': "what it gives lacks speed",
+    'out.real("speed", in.real("neares")); out.element("light", "red");': "`neares`: did you mean `nearest`?",
+    'out.real("speed", double(in.integer("nearest")));': "`nearest` is read by real(), not by integer()",
+    'out.real("speed", in.reals("nearest")[0]);': "`nearest` is read by real(), not by reals()",
+    'out.real("sped", 1); out.element("light", "red");': "`sped`, which is no output and lacks speed: did you mean",
+    'out.real("speed", 1); out.real("speed", 1);': "`speed` is given twice",
+    'out.real("speed", 1); out.element("light", "reed");': "`reed` for light, whose type has no such element: did you",
+    'out.real("speed", 1); out.element("light", in.real("nearest") < 7 ? "green" : "gren");': "did you mean `green`?",
 }
 
 
-@pytest.mark.nightly
-@pytest.mark.parametrize("step", MISFITS)
+@pytest.mark.parametrize("step", some(MISFITS, 2, 1))
 def test_an_adapter_that_does_not_fit(step: str, tmp_path: Path) -> None:
-    found = replace(LIMITER, adapter=adapter("Limiter", "", f"(void)in; (void)out; {step}")).outcomes(tmp_path)
-    assert not any(o.verdict.supports for o in found.values()), {o.verdict: o.summary for o in found.values()}
+    """An unknown name or a wrong type is the adapter's error, at its line: it refutes nothing, and nothing is left."""
+    rcl = "context { Light : {red, green}; }\nnode n { inputs( nearest : REAL ) outputs( speed : REAL, light : Light )"
+    rcl += " topics()\n guarantee stops ( in.nearest < 1 -> out.speed == 0 ) guarantee lit ( out.light == red ) }"
+    text = adapter("Limiter", "", f"(void)in; (void)out; {step}")
+    found = Cpp("n", rcl, text).outcomes(tmp_path)
+    assert {o.verdict for o in found.values()} == {Verdict.ERROR}, {o.verdict: o.summary for o in found.values()}
+    (said,) = {o.summary for o in found.values()}
+    assert MISFITS[step] in said
+    assert re.match(r"src/adapter\.hpp(:\d+)?: the adapter does not fit the contract: ", said), said
 
 
 @pytest.mark.nightly

@@ -46,9 +46,15 @@ class Values {
  protected:
   const Value& find(const std::string& name, Sort sort, bool many) const {
     auto found = held_.find(name);
-    if (found == held_.end()) throw Misuse("there is no " + name);
-    if (found->second.sort != sort || found->second.many != many) throw Misuse(name + " is of another type");
-    return found->second;
+    if (found == held_.end()) throw Misuse("there is no `" + name + "`");
+    const Value& value = found->second;
+    if (value.sort != sort || value.many != many)
+      throw Misuse("`" + name + "` is read by " + reader(value.sort, value.many) + ", not by " + reader(sort, many));
+    return value;
+  }
+  static std::string reader(Sort sort, bool many) {
+    static const char* const names[] = {"truth", "integer", "real", "element"};
+    return names[static_cast<unsigned char>(sort)] + std::string(many ? "s()" : "()");
   }
   std::map<std::string, Value> held_;
 };
@@ -109,7 +115,7 @@ class Outputs : public Values {
 
  private:
   Value& give(const std::string& name, Sort sort, bool many) {
-    if (held_.count(name) != 0) throw Misuse(name + " is given twice");
+    if (held_.count(name) != 0) throw Misuse("`" + name + "` is given twice");
     Value& made = held_[name];
     made.sort = sort;
     made.many = many;
