@@ -228,7 +228,10 @@ def _readable(path: Path) -> Iterator[None]:
         if "type definition" in why:
             hint = "the bag holds no definitions: name the distribution, `ros: {distro: humble}`, and `messages:`"
         if path.is_dir() and not (path / "metadata.yaml").exists():
-            why, hint = "its folder has no metadata.yaml", f"`ros2 bag reindex {path}` writes it from the recorded files"
+            why, hint = (
+                "its folder has no metadata.yaml",
+                f"`ros2 bag reindex {path}` writes it from the recorded files",
+            )
         raise NoBag(f"{path} cannot be read as a bag: {why}", hint) from None
 
 

@@ -52,6 +52,14 @@ def test_the_tutorials_contract_and_plan_are_what_it_says(tmp_path: Path, monkey
         assert not isinstance(survey(Path("contracts") / system), Rejected)
 
 
+@pytest.mark.parametrize("page", ["tutorial.md", "own-ros2-robot.md", "../README.md"])
+def test_a_page_that_types_avow_says_where_the_shell_finds_it(page: str) -> None:
+    """Before the first command of that name; the README's own commands name their place."""
+    text = (TUTORIAL.parent / page).read_text(encoding="utf-8")
+    typed = re.search(r"^(avow|doit) ", text, re.MULTILINE)
+    assert "source .venv/bin/activate" in (text[: typed.start()] if typed else text)
+
+
 def exit_code(arguments: list[str]) -> int:
     try:
         main(arguments)
