@@ -20,8 +20,9 @@ ROS_CODES = register(
     declare(
         "ROS104",
         "unknown message type",
-        "A known package lacks this message type, or a service or action lacks its part.",
-        "Correct the type; write `package/Type_Request`, `_Response`, `_Goal`, `_Result` or `_Feedback`.",
+        "A known package lacks this message type, `messages` lacks its package, or a service or action lacks its part.",
+        "Correct the type, or add its definition under `messages`; "
+        "write `package/Type_Request`, `_Response`, `_Goal`, `_Result` or `_Feedback`.",
         warning=True,
     ),
     declare(

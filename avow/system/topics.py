@@ -14,7 +14,7 @@ from dataclasses import replace
 
 from avow.base.diagnostics import Diagnostic, Severity, Span
 from avow.base.records import dataclass
-from avow.base.suggestions import suggest
+from avow.base.suggestions import nearest
 from avow.language.contract import Clause, ClauseKind, Contract, Node, Port, Topic
 from avow.language.sorts import BOOL, FunctionSort
 from avow.language.terms import Apply, Compare, Iff, Or, Quantified, Quantifier, Role, Term, Variable
@@ -99,6 +99,7 @@ def unknown_types(plan: Plan, contract: Contract) -> Iterator[Diagnostic]:
     known, wrong = definitions(plan.messages, plan.ros.distro)
     yield from wrong
     packages = {name.partition("/")[0] for name in known.messages}
+    missing: set[str] = set()
     for topic in (topic for node in contract.nodes for topic in node.topics):
         kind = canonical(topic.ros_type)
         if kind in known.messages:
@@ -107,9 +108,19 @@ def unknown_types(plan: Plan, contract: Contract) -> Iterator[Diagnostic]:
         if parts:
             message = f"{kind} is a service or an action: which part of a call {topic.name} carries is not said"
             yield Diagnostic("ROS104", message, topic.span, Severity.WARNING, f"write {' or '.join(parts)}")
-        elif kind.partition("/")[0] in packages:
-            hint = suggest(kind, [name for name in known.messages if name.startswith(kind.partition("/")[0])])
-            yield Diagnostic("ROS104", f"nothing defines {kind}", topic.span, Severity.WARNING, hint)
+            continue
+        package = kind.partition("/")[0]
+        if package in packages:
+            near = [f"`{name}`" for name in nearest(kind, (k for k in known.messages if k.startswith(f"{package}/")))]
+            text = f"nothing defines {kind}"
+        else:
+            near = [f"the package `{name}`" for name in nearest(package, packages, alike=0.75)]
+            text = f"neither `messages` nor the distribution has the package {package}, of {kind}"
+        if package in packages or (plan.messages and package not in missing):  # one warning for a missing package
+            meant = "".join(f"did you mean {name}? If not, " for name in near)
+            hint = f"{meant}add its definition (`{package}/msg/….msg`) under `messages`"
+            yield Diagnostic("ROS104", text, topic.span, Severity.WARNING, hint)
+        missing |= {package} - packages
 
 
 def turned(plan: Plan, contract: Contract) -> Iterator[Diagnostic]:

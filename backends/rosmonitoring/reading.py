@@ -250,7 +250,7 @@ def _hint(
     return None
 
 
-SOURCES = "name its file under `messages:`, or the distribution: `ros: {distro: noetic}`"
+SOURCES = "name its file under `messages:`, or the distribution: `ros: {distro: …}`"
 
 
 def suits(sort: Sort, wire: Wire, holder: Message, known: Definitions, values: Mapping[str, str]) -> bool:

@@ -298,7 +298,7 @@ def session(
         if not problems:
             monitors.append(make(found))
     if faults:
-        raise Rejected(*faults)
+        raise Rejected(*dict.fromkeys(faults))  # several nodes may have the same topic
     planned = [n.node for n in system.plan.nodes if any(m.backend == NAME for m in n.methods)]
     return Session(system, tuple(monitors), asked=frozenset(nodes or planned or known))
 

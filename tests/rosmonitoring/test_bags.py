@@ -12,6 +12,7 @@ import pytest
 from avow.backends.rosmonitoring.engine import Monitor
 from avow.backends.rosmonitoring.options import known_types, origin, setup
 from avow.backends.rosmonitoring.pairing import time_of
+from avow.backends.rosmonitoring.session import session
 from avow.backends.rosmonitoring.told import readable
 from avow.backends.rosmonitoring.traces import read_trace
 from avow.base.diagnostics import Rejected
@@ -119,6 +120,17 @@ def test_another_type_or_definition_is_no_trace_of_this_system(
         changed["std_msgs/Header"] = "uint32 seq\ntime stamp\nstring frame_id"
     with pytest.raises(Rejected, match="float32 level"):
         judge(make_system(RCL.format(kind="my/Level"), messages=changed), bag)
+
+
+def test_what_is_wrong_with_a_topic_of_several_nodes_is_told_once(
+    make_system: Callable[..., System], tmp_path: Path
+) -> None:
+    bag = write_bag(tmp_path / "run", "sqlite3", "my/msg/Level", [{"level": 0.5, "note": "a"}], CUSTOM)
+    one = RCL.format(kind="std_msgs/Float64")
+    system = make_system(one + one.replace("node n ", "node m "))
+    with pytest.raises(Rejected) as wrong:
+        session(system, trace=bag)
+    assert [d.code for d in wrong.value.diagnostics] == ["MON205"]
 
 
 @pytest.mark.parametrize("distro", ["humble", "jazzy"])

@@ -222,15 +222,36 @@ def test_wrong_types_remaps_and_publishers_are_told_by_check_in_one_round(
 
 @pytest.mark.parametrize(
     ("kind", "message"),
-    [("my/Sped", ""), ("my/Speed", "nothing defines my/Speed"), ("std_srvs/SetBool", "which part of a call")],
+    [
+        ("my/Sped", ""),
+        ("my/Speed", "nothing defines my/Speed"),
+        ("mine/Sped", "the package mine"),
+        ("std_srvs/SetBool", "which part of a call"),
+    ],
 )
 def test_types_that_nothing_defines(tmp_path: Path, kind: str, message: str) -> None:
     from avow.pipeline.plan_check import of_plan
 
     (tmp_path / "my").mkdir()
     (tmp_path / "my/Sped.msg").write_text("float64 v\n", encoding="utf-8")
-    text = f"node a {{ inputs( ) outputs( x : REAL ) topics( {kind} t matches(out.x) ) guarantee g ( out.x >= 0 ) }}"
+    text = f"node a {{ inputs( ) outputs( x : REAL ) topics( {kind} t matches(out.x), {kind} u ) guarantee g (TRUE) }}"
     (tmp_path / "system.rcl").write_text(text, encoding="utf-8")
     (tmp_path / "plan.yaml").write_text("messages: [my]", encoding="utf-8")
-    found = [d.message for d in of_plan(load_system(tmp_path)) if d.code == "ROS104"]
-    assert [message in text for text in found] == ([True] if message else [])
+    found = [d for d in of_plan(load_system(tmp_path)) if d.code == "ROS104"]
+    twice = (
+        1 if kind.startswith("mine/") else 2
+    )  # a missing package is one warning, and a missing type one for each topic
+    assert [message in d.message for d in found] == ([True] * twice if message else [])
+    assert all("under `messages`" in str(d.hint) for d in found if "part of a call" not in message)
+
+
+def test_a_folder_of_messages_with_a_slip_in_its_name_is_told(tmp_path: Path) -> None:
+    from avow.pipeline.plan_check import of_plan
+
+    (tmp_path / "msg" / "rover_msg").mkdir(parents=True)
+    (tmp_path / "msg" / "rover_msg" / "Zone.msg").write_text("uint8 zone\n", encoding="utf-8")
+    text = "node a { inputs( ) outputs( x : REAL ) topics( rover_msgs/Zone t matches(out.x) ) guarantee g (TRUE) }"
+    (tmp_path / "system.rcl").write_text(text, encoding="utf-8")
+    (tmp_path / "plan.yaml").write_text("messages: [msg]\nros: {distro: humble}", encoding="utf-8")
+    (found,) = (d for d in of_plan(load_system(tmp_path)) if d.code == "ROS104")
+    assert "did you mean the package `rover_msg`?" in str(found.hint)
