@@ -142,7 +142,8 @@ _CELL = mapping(
     *("table", "key", "by", "column"),
 )
 ARGUMENT = {"oneOf": [PATH, _CELL]}
-_BECAUSE = {"because": {"type": "string", "minLength": 1}}
+REASON = {"type": "string", "pattern": r"[^\W_]", "description": "a reason in words (`...` is none)"}
+_BECAUSE = {"because": REASON}
 _PORTS = {"input": PATH, "output": PATH}
 _LATENCY = {"by": {"const": "latency"}, "latency": DURATION, "jitter": DURATION, **_BECAUSE}
 _ANSWERS = (

@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
 
-from avow.backend_kit.given import file_bytes, mapping, schema
+from avow.backend_kit.given import REASON, file_bytes, mapping, schema
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.system.plan import Located
 from avow.system.schema import violations
@@ -47,7 +47,7 @@ _SCHEMA = schema(
         "percepts": _NARROWED,
         "start": _NARROWED,
         "after": {"type": "object", "additionalProperties": _NARROWED},
-        "fair": {"type": "array", "items": mapping({"percept": _TEXT, "because": _TEXT}, "percept", "because")},
+        "fair": {"type": "array", "items": mapping({"percept": _TEXT, "because": REASON}, "percept", "because")},
     },
     "percepts",
 )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from avow.backend_kit.given import file, mapping, schema, text
+from avow.backend_kit.given import REASON, file, mapping, schema, text
 
 _TEXT = {"type": "string"}
 _RANGES: dict[str, Any] = {
@@ -50,7 +50,7 @@ SCHEMA = schema(
                             "counts": {"type": "boolean", "description": "false: listed only; default true"},
                             "instances": {**_RANGES, "description": "narrower ranges than the method's"},
                             "forbids": text("RCL pattern: what the guarantee forbids; this says when"),
-                            "because": _TEXT,
+                            "because": REASON,
                         },
                         "psl",
                     ),

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from fractions import Fraction
 from typing import Any
 
-from avow.backend_kit.given import existing_file, file, schema, text
+from avow.backend_kit.given import REASON, existing_file, file, schema, text
 from avow.backend_kit.protocol import Job
 from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.base.plain import alike, exact
@@ -69,7 +69,7 @@ SCHEMA = schema(
             "type": "object",
             "properties": {
                 "runs": {"type": "array", "items": {"type": ["string", "integer"]}, "minItems": 1},
-                "because": {"type": "string", "minLength": 1},
+                "because": REASON,
             },
             "required": ["runs", "because"],
             "additionalProperties": False,
