@@ -67,7 +67,7 @@ INSTEAD = {
 """What of ROS is not driven (how its name ends), and what may serve in its place."""
 
 
-def called_from(frames: Sequence[traceback.FrameSummary]) -> str:
+def _called_from(frames: Sequence[traceback.FrameSummary]) -> str:
     """The line of the class's own code at which something came about: not ours, not Python's."""
     known = tuple(os.path.realpath(os.path.dirname(file)) for file in (os.path.dirname(__file__), os.__file__))  # noqa: PTH120
     own = [frame for frame in frames if not os.path.realpath(frame.filename).startswith(known)]
@@ -119,7 +119,7 @@ class Driven:
         instead = next((f"; instead: {text}" for end, text in INSTEAD.items() if what.endswith(end)), "")
         if what.startswith(("time.", "datetime.")) and not instead:
             instead = f"; instead: {'rospy.Time.now()' if self.kind == 'rospy' else 'get_clock().now()'}"
-        self.refused.append(f"{what}{called_from(traceback.extract_stack())}{instead}")
+        self.refused.append(f"{what}{_called_from(traceback.extract_stack())}{instead}")
         return NotDriven(f"{what} is not driven{instead}")
 
     def clocks(self) -> None:
@@ -426,7 +426,7 @@ def answers(driven: Driven, values: Any, make: Callable[[Any, Any], Any]) -> Cal
                 if threading.active_count() > 1:
                     driven.refuse("a thread of its own")
             except Exception as error:
-                wrong = f"{type(error).__name__}: {error}"[:300] + called_from(
+                wrong = f"{type(error).__name__}: {error}"[:300] + _called_from(
                     traceback.extract_tb(error.__traceback__)
                 )
             return json.dumps(

@@ -6,7 +6,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from avow.assurance.answers import MEANINGS as LEVELS
+from avow.assurance import answers
 from avow.assurance.model import Case, ObligationView
 from avow.assurance.naming import short
 from avow.base.verdict import Counterexample, in_words
@@ -36,7 +36,7 @@ def show_obligation(case: Case, view: ObligationView, console: Console | None = 
     stands, meaning, formula = _status(view.standing), MEANINGS[view.standing], o.formula
     if required is not None:  # a requirement has one verdict, and its formula in the plan's words
         stands = f"[{_COLOURS.get(required.tone, required.tone)}]{required.tone.mark} {required.level}[/]"
-        meaning, formula = LEVELS[required.level], required.formal
+        meaning, formula = answers.MEANINGS[required.level], required.formal
     out.print(f"[bold]{escape(view.id)}[/]   {stands} [dim]{meaning}[/]")
     out.print(escape(o.claim))
     if formula:

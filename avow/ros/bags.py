@@ -7,14 +7,16 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from avow.base.files import read_text
 from avow.base.records import dataclass
 from avow.ros.calls import Calls, as_message, parts_of, with_parts
 from avow.ros.definitions import Definitions, Message, canonical
-from avow.ros.layout import Layout
 from avow.ros.sources import DISTRIBUTIONS, from_store, message_files
+
+if TYPE_CHECKING:
+    from avow.ros.layout import Layout
 
 Event = Mapping[str, Any]
 
@@ -182,6 +184,8 @@ def recorded(
                 return Channel(topic, by, lambda raw: {}), False, False
 
             def layout(raw: bytes) -> Layout | None:
+                from avow.ros.layout import Layout  # numpy starts threads, and a run forks while it has one
+
                 return Layout.of(kind, known, raw, ros2)
 
             def read(raw: bytes) -> Mapping[str, Any]:

@@ -12,6 +12,7 @@ from typing import Any
 from avow.backend_kit.linked import Recorded, settled
 from avow.backend_kit.programs.judging import Formula, NoValue, Seen, exact, returned, seen, started, triggers
 from avow.backend_kit.programs.samples import as_single, next_single
+from avow.base.files import read_text
 from avow.base.suggestions import did_you_mean
 from avow.base.verdict import Counterexample, Hypothesis, HypothesisKind, Outcome, Verdict
 from avow.drive.steps import coded, plain
@@ -234,7 +235,7 @@ class Bench:
         ports = (*reading.node.inputs, *reading.node.outputs)
         names = {*known} or {*reading.params, *(port.name for port in ports)}
         hint = did_you_mean(name, names) if name and name not in names else None
-        lines = reading.adapter.read_text(encoding="utf-8", errors="replace").splitlines()
+        lines = read_text(reading.adapter, errors="replace").splitlines()
         line = next((f":{at}" for at, text in enumerate(lines, 1) if f'"{name}"' in text), "")
         why = said.removeprefix("the adapter: ")
         place = f"{reading.source.cpp}{line}"
