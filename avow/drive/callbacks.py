@@ -19,6 +19,7 @@ import importlib.machinery
 import json
 import math
 import os
+import random
 import struct
 import sys
 import threading
@@ -122,8 +123,9 @@ class Driven:
         self.refused.append(f"{what}{_called_from(traceback.extract_stack())}{instead}")
         return NotDriven(f"{what} is not driven{instead}")
 
-    def clocks(self) -> None:
-        """Refuses Python's clocks to the class: they go on while its own time stands still. Python itself has them."""
+    def clocks_and_chance(self) -> None:
+        """Refuses the class Python's clocks, which go on while its own time stands still, and unseeded random numbers.
+        Python's own library has them."""
         library = os.path.dirname(os.__file__) + os.sep  # noqa: PTH120
 
         def refusing(name: str, real: Any) -> Any:
@@ -141,6 +143,15 @@ class Driven:
             reads = [name for name in ("now", "utcnow", "today") if hasattr(kind, name)]
             content = {n: staticmethod(refusing(f"datetime.{kind.__name__}.{n}", getattr(kind, n))) for n in reads}
             setattr(datetime, kind.__name__, _Substitute(kind.__name__, (kind,), {**content, "_avow_real": kind}))
+        names = vars(random)
+        drawing = {name: real for name, real in names.items() if getattr(real, "__self__", None) is names["_inst"]}
+
+        def seed(*given: Any, **named: Any) -> None:
+            if any(value is not None for value in (*given, *named.values())):
+                names.update(drawing)  # from its own seed it draws the same numbers in every run, on the robot too
+            drawing["seed"](*given, **named)
+
+        names.update({name: refusing(f"random.{name}", real) for name, real in drawing.items()}, seed=seed)
 
     def module(self, name: str, content: dict[str, Any]) -> types.ModuleType:
         made = types.ModuleType(name)
@@ -340,8 +351,8 @@ class Driven:
     # -- modules -----------------------------------------------------------------------------------------
 
     def install(self) -> None:
-        """Install the modules of messages, and refuse every other module of ROS, and Python's clocks."""
-        self.clocks()
+        """Install the modules of messages, and refuse every other module of ROS, clocks and chance."""
+        self.clocks_and_chance()
         self.classes |= {name: self.message_class(name) for name in self.types}
         packages: dict[str, dict[str, Any]] = {}
         for name, made in self.classes.items():

@@ -243,11 +243,11 @@ def main() -> None:
     source, sink = int(sys.argv[4]), int(sys.argv[5])
     sys.argv[:], sys.orig_argv[:] = [path], [sys.executable, path]  # the same at every run
     with os.fdopen(source, "r", encoding="utf-8") as requests, os.fdopen(sink, "w", encoding="utf-8") as answers:
+        random.seed(0)
         drive = driving(function)
         _read_sources_only(os.path.realpath(root))
         seen = _beside("watching.py").watch(tempfile.gettempdir())
         before = _found_before()
-        random.seed(0)
 
         def say(message: dict[str, Any], earlier: list[tuple[str, str]] = before[:0]) -> None:
             answers.write(json.dumps({**message, "seen": [*earlier, *seen()]}) + "\n")

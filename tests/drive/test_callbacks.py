@@ -202,11 +202,12 @@ REFUSED = [
 
 CLOCKS = ["time.time()", "time.monotonic()", "time.perf_counter_ns()", "time.sleep(0)", "time.localtime()"]
 CLOCKS += ["datetime.datetime.now()", "datetime.datetime.utcnow()", "datetime.date.today()"]
+CHANCE = ["random.random()", "random.seed(); random.choice([1, 2])", "random.seed(None); random.gauss(0, 1)"]
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("kind", "instead"), [("rospy", "rospy.Time.now()"), ("rclpy", "get_clock().now()")])
-def test_a_clock_of_python_is_refused_by_name_and_line(tmp_path: Path, kind: str, instead: str) -> None:
+def test_a_clock_of_python_and_chance_are_refused_by_name_and_line(tmp_path: Path, kind: str, instead: str) -> None:
     """Also where two runs agree by chance, or it is caught; dates without a clock, and Python's own use, are driven."""
     text = ROS1 if kind == "rospy" else ROS2
     lines = "import datetime, logging, time, threading; logging.warning('x'); threading.Event().wait(0.001)"
@@ -217,12 +218,16 @@ def test_a_clock_of_python_is_refused_by_name_and_line(tmp_path: Path, kind: str
     folder = system(tmp_path / "w", kind, text.replace("# HERE", lines))
     done = drive(folder, "watch", trace(tmp_path))
     assert done.return_value == 0, (done.output, done.exception)
-    lines += "".join(f"\n        try: {line}\n        except Exception: pass" for line in CLOCKS)
+    lines = lines.replace("import datetime,", "import random, datetime,")
+    lines += "".join(f"\n        try: {line}\n        except Exception: pass" for line in (*CLOCKS, *CHANCE))
+    lines += "\n        random.seed(7); random.random(); random.Random(3).random()"
     (folder / "src/watch.py").write_text(text.replace("# HERE", lines), encoding="utf-8")
     found = told(drive(folder, "watch", trace(tmp_path)))
     first = text[: text.index("# HERE")].count("\n") + 7
     wanted = [f"{line.partition('(')[0]} (watch.py, line {first + 2 * at})" for at, line in enumerate(CLOCKS)]
+    wanted += [f"random.{name} (watch.py, line " for name in ("random", "choice", "gauss")]
     assert [why for why in wanted if why not in found] == [], found
+    assert found.count("random.") == 3
     assert f"; instead: {instead}" in found
 
 
