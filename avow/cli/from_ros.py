@@ -5,12 +5,14 @@ from __future__ import annotations
 import os
 import re
 import shutil
+from collections.abc import Iterator
 from dataclasses import replace
 from itertools import islice
 from pathlib import Path
 
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.files import write
+from avow.base.suggestions import did_you_mean
 from avow.base.tuning.running import DRAFT_MESSAGES
 from avow.base.tuning.sizes import ROS_GRAPH_BYTES
 from avow.language.format import format_text
@@ -29,8 +31,10 @@ _MASTER = re.compile(r"https?://[^/\s]+/?\Z|ros1\Z")
 _DOMAIN = re.compile(r"((?:dds|ros2)(?::\d+)?)(?:@([\w.:-]+))?\Z")
 
 
-def draft_system(bag: Path | None, graph: str | None, distro: str | None, folder: Path) -> None:
-    """Write the system's folder. Raises Rejected if something cannot be read; nothing is written then."""
+def draft_system(bag: Path | None, graph: str | None, distro: str | None, folder: Path) -> tuple[str, ...]:
+    """Write the system's folder; returns how bag and graph disagree. Raises Rejected if something cannot be read;
+    nothing is written then."""
+    differences: tuple[str, ...] = ()
     known, wrong = definitions((), distro)
     if wrong:
         raise Rejected(*wrong)
@@ -50,6 +54,7 @@ def draft_system(bag: Path | None, graph: str | None, distro: str | None, folder
                 heard |= _names_in(event)
         except NoBag as no:
             raise Rejected(Diagnostic("CLI011", str(no), hint=no.hint and no.hint.replace(*_OPTION))) from None
+        differences = tuple(_differences(listing, found)) if listing is not None else ()
         listing, unsaid = _together(listing, found, heard)
         given = replace(
             given,
@@ -82,6 +87,20 @@ def draft_system(bag: Path | None, graph: str | None, distro: str | None, folder
     if bag is not None:
         write(folder / "traces/.gitignore", f"# large, and named in plan.yaml with its digest\n/{bag.name}\n")
         (shutil.copytree if bag.is_dir() else shutil.copyfile)(bag, folder / "traces" / bag.name)
+    return differences
+
+
+def _differences(listing: Listing, found: Carried) -> Iterator[str]:
+    """The topics that only the bag has, and those with another type in the graph."""
+    known = {topic for node in listing.nodes for side in EVERY_SIDE for topic in getattr(node, side)}
+    for topic, kind in sorted(found.types.items()):
+        if is_plumbing(topic) or is_part(topic):
+            continue
+        if topic not in known:
+            near = did_you_mean(topic, known - found.types.keys())
+            yield f"{topic} is in the bag, and no node of the graph has it{f': {near}' if near else ''}"
+        elif listing.types.get(topic, kind) != kind:
+            yield f"{topic} has the type {kind} in the bag, and {listing.types[topic]} in the graph"
 
 
 _OPTION = (

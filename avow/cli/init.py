@@ -92,7 +92,8 @@ def _drafted(directory: Path, bag: Path | None, graph: str | None, distro: str |
     outer = find_workspace(directory.resolve().parent)
     within = outer is not None and directory.resolve().parent == outer.contracts.resolve()
     name = re.sub(r"[^A-Za-z0-9_-]", "_", directory.resolve().name).lstrip("_-0123456789") or "robot"
-    draft_system(bag, graph, distro, directory if within else directory / "contracts" / name)
+    for text in draft_system(bag, graph, distro, directory if within else directory / "contracts" / name):
+        click.echo(f"warning: {text}", err=True)
     if not within:
         _workspace(directory)
     name = directory.name if within else name

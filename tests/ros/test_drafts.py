@@ -81,13 +81,18 @@ def make_bag(path: Path, form: str, *, bare: bool = False) -> Path:
     return path
 
 
-def run(folder: Path, *options: str) -> Path:
+def run(folder: Path, *options: str, lacking: str = "") -> Path:
+    """`lacking`: the package whose message types nothing defines."""
     result = CliRunner().invoke(init, [str(folder), *options], catch_exceptions=False)
     assert result.exit_code == 0, result.output
     (system,) = (folder / "contracts").iterdir()
     checked = CliRunner().invoke(check, [str(system)], standalone_mode=False, catch_exceptions=False)
     assert checked.return_value == 0, checked.output
-    assert checked.output == "1 file: no errors\n"  # and no warning
+    if lacking:
+        assert f"has the package {lacking}" in checked.output
+        assert checked.output.endswith("1 file: 1 warning\n")
+    else:
+        assert checked.output == "1 file: no errors\n"  # and no warning
     return system
 
 
@@ -142,11 +147,29 @@ def test_a_bag_and_a_graph(form: str, tmp_path: Path) -> None:
     (tmp_path / "graph.txt").write_text(GRAPH, encoding="utf-8")
     bag = make_bag(tmp_path / "run", form)
     options = ("--from-bag", str(bag), "--from-graph", str(tmp_path / "graph.txt"), "--distro", "humble")
-    loaded = load_system(run(tmp_path / "w", *options))
+    loaded = load_system(run(tmp_path / "w", *options, lacking="nobody"))
     graph = dataflow(loaded)
     assert [str(edge) for edge in graph.edges] == ["geiger.rate → sensor.rate"]
     assert {at.port for at in graph.environment} == {"goal_x", "goal_y", "goal_z"}
     assert loaded.plan.model.data["dropped"] == {"/rviz2": "shows what others publish"}
+
+
+@pytest.mark.parametrize(
+    ("edits", "wanted"),
+    [
+        ((), []),
+        (("/geiger/rate", "/geiger/ratte"), ["/geiger/rate is in the bag, and no node of the graph has it", "/ratte`"]),
+        (("Float64", "Float32"), ["/geiger/rate has the type std_msgs/Float64 in the bag, and std_msgs/Float32"]),
+    ],
+)
+def test_where_bag_and_graph_disagree_is_reported(edits: tuple[str, ...], wanted: list[str], tmp_path: Path) -> None:
+    (tmp_path / "graph.txt").write_text(GRAPH.replace(*edits) if edits else GRAPH, encoding="utf-8")
+    bag = make_bag(tmp_path / "run", "ros1")
+    options = ("--from-bag", str(bag), "--from-graph", str(tmp_path / "graph.txt"))
+    done = CliRunner().invoke(init, [str(tmp_path / "w"), *options], catch_exceptions=False)
+    assert done.exit_code == 0
+    assert done.stderr.count("warning: ") == bool(wanted)
+    assert [text for text in wanted if text not in done.stderr] == []
 
 
 def test_a_bag_without_definitions_wants_a_distribution(tmp_path: Path) -> None:
