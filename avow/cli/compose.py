@@ -153,7 +153,7 @@ def _shown(counterexample: Counterexample) -> str:
 def _listing(
     composition: Composition, goals: list[Goal], obligations: list[Obligation], outcomes: tuple[Outcome, ...]
 ) -> None:
-    console = Console(highlight=False)
+    console = Console(highlight=False, emoji=False)
     levels = (composition.frame_of(goal).graph for goal in goals if goal.name in composition.levels)
     findings = [
         *composition.frame.graph.findings,

@@ -35,7 +35,7 @@ def command(name: str, as_json: bool) -> int:
     if as_json:
         click.echo(document({"systems": found}))
         return 0
-    console = Console(highlight=False)
+    console = Console(highlight=False, emoji=False)
     for read in found:
         for group, kinds in _GROUPS.items():
             _show(console, read.system, group, [claim for claim in read.obligations if claim.kind in kinds])

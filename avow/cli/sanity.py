@@ -74,7 +74,7 @@ _COLOURS = {"proved": "green", "checked": "cyan", "unknown": "yellow", "refuted"
 
 
 def _listing(results: list[SanityResult], everything: bool) -> None:
-    console = Console(highlight=False)
+    console = Console(highlight=False, emoji=False)
     folded = [] if everything else [r for r in results if _free(r)]
     shown = [r for r in results if everything or not (r.verdict is Verdict.PROVED or r.because or r in folded)]
     node = ""

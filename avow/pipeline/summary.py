@@ -29,7 +29,7 @@ def print_summary(
     systems whose reports are of an earlier state."""
     if not results and not broken:
         return
-    console = Console(file=out, highlight=False, soft_wrap=True, width=None if out.isatty() else 150)
+    console = Console(file=out, highlight=False, emoji=False, soft_wrap=True, width=None if out.isatty() else 150)
     shown = [word for word in (*GOOD, *BAD) if any(r.counts.get(word) for r in results)]
     table = Table(box=None, header_style="bold", pad_edge=False)
     table.add_column("system")
@@ -143,7 +143,7 @@ def print_obligations(selected: Sequence[str], out: IO[str]) -> None:
     from avow.pipeline.workload import Listing
 
     wanted = {name.partition(":")[2] for name in selected if name.startswith("obligations")} - {""}
-    console = Console(file=out, highlight=False)
+    console = Console(file=out, highlight=False, emoji=False)
     for path in sorted(Path("artifacts").glob("*/obligations.json")):
         if wanted and path.parent.name not in wanted:
             continue

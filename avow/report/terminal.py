@@ -30,7 +30,7 @@ _COLOURS = {"good": "green", "fair": "blue", "open": "yellow", "bad": "red", "am
 
 def show_obligation(case: Case, view: ObligationView, console: Console | None = None) -> None:
     """Print everything known about an obligation."""
-    out = console or Console(highlight=False)
+    out = console or Console(highlight=False, emoji=False)
     o = view.obligation
     required = next((r for r in case.requirements if view.id in r.obligations), None)
     stands, meaning, formula = _status(view.standing), MEANINGS[view.standing], o.formula

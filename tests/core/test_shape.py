@@ -277,3 +277,11 @@ def test_files_of_a_workspace_are_read_so_that_nobody_waits_for_a_pipe() -> None
         and "resources" not in ast.unparse(call)
     }
     assert found - {"avow/base/grammars.py"} == GIVEN | OWN
+
+
+def test_no_console_turns_names_into_pictures() -> None:
+    """Rich shows ``:boat:`` as an emoji, and a task is called ``discharge:boat:helm``."""
+    calls = [call for tree in product().values() for call in nodes(tree) if isinstance(call, ast.Call)]
+    made = [call for call in calls if isinstance(call.func, ast.Name) and call.func.id == "Console"]
+    assert len(made) > 4
+    assert [ast.unparse(call) for call in made if "emoji=False" not in ast.unparse(call)] == []
