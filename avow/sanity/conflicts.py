@@ -314,12 +314,12 @@ class _Known:
 
     def seed(self) -> frozenset[str] | None:
         """A maximal set of unknown status; None if there is none."""
-        seed: set[str] = set()
         if self._solver.check() != z3.sat:
             return None
-        seed |= self._true()
+        seed = self._true()
         for label in self._chosen:
-            if label not in seed and self._solver.check(*(self._chosen[k] for k in (*seed, label))) == z3.sat:
+            together = [v for k, v in self._chosen.items() if k in seed or k == label]
+            if label not in seed and self._solver.check(*together) == z3.sat:
                 seed |= self._true()
         return frozenset(seed)
 
@@ -331,7 +331,7 @@ class _Known:
         self._solver.add(z3.Or([v for label, v in self._chosen.items() if label not in labels] or [self._false()]))
 
     def have(self, labels: Collection[str]) -> None:
-        self._solver.add(z3.Or([z3.Not(self._chosen[label]) for label in labels] or [self._false()]))
+        self._solver.add(z3.Or([z3.Not(v) for label, v in self._chosen.items() if label in labels] or [self._false()]))
 
     def without(self, labels: Collection[str]) -> None:
         """Exclude only this set from further seeds."""

@@ -86,7 +86,7 @@ class _Asked:
     values exist."""
 
     labelled: Mapping[str, Term]
-    free: frozenset[Variable]
+    free: tuple[Variable, ...]
     given: Mapping[Variable, Value]
     effort: int
     seed: int
@@ -95,6 +95,11 @@ class _Asked:
     def fixed(self, translator: Translator) -> dict[Variable, Meaning]:
         """The given values, as meanings."""
         return {variable: translator.value(value, variable.sort) for variable, value in self.given.items()}
+
+
+def _in_order(variables: Iterable[Variable]) -> tuple[Variable, ...]:
+    """Each variable once, by name: a set's order differs from run to run, and with it the solver's steps."""
+    return tuple(sorted(set(variables), key=lambda v: (v.qualified, repr(v.sort))))
 
 
 # -- terms -------------------------------------------------------------------------------------------------------------
@@ -117,12 +122,13 @@ def solve(
     """
     start = time.monotonic()
     labelled = dict(formulas) if isinstance(formulas, Mapping) else {str(k): f for k, f in enumerate(formulas)}
-    free = frozenset(chain(variables, *(free_variables(f) for f in labelled.values())))
+    free = _in_order(chain(variables, *(free_variables(f) for f in labelled.values())))
     granted = allowed(effort)
     with same_session(), budget(effort * QUESTION_SHARE):
         if not allowed(effort):
             return Solution("unknown", reason=NO_ANSWER)
-        asked = _Asked(labelled, free, given or {}, effort, seed, values != "unused")
+        fixed = {v: given[v] for v in _in_order(given)} if given else {}
+        asked = _Asked(labelled, free, fixed, effort, seed, values != "unused")
         try:
             solution = _within_bounds(asked) or _solve(Translator(), asked)
         except Unsupported as error:
@@ -173,12 +179,11 @@ def entails(
 def _solve(translator: Translator, question: _Asked) -> Solution:
     labelled, given, effort, seed = question.labelled, question.given, question.effort, question.seed
     fixed = question.fixed(translator)
-    free = question.free - set(fixed)
+    free = [v for v in question.free if v not in fixed]
     tracked = [(label, translator.term(formula, fixed)) for label, formula in labelled.items()]
     background = [*translator.background(free), *translator.opaque_facts()]
-    ordered = sorted(free, key=lambda v: (v.qualified, repr(v.sort)))
-    ordinary = [v for v in ordered if not isinstance(v.sort, FunctionSort)]
-    functions = [v for v in ordered if isinstance(v.sort, FunctionSort)]
+    ordinary = [v for v in free if not isinstance(v.sort, FunctionSort)]
+    functions = [v for v in free if isinstance(v.sort, FunctionSort)]
 
     whole = [*background, *(expr for _, expr in tracked)]
     numbers = [translator.variable(v) for v in ordinary]
@@ -243,7 +248,7 @@ def _within_bounds(asked: _Asked) -> Solution | None:
     sequences = [v for v in asked.free if isinstance(v.sort, SequenceSort) and v not in asked.given]
     flat = flatten({**labelled, _INSIDE: inside}, sequences)
     formulas = flat.formulas if flat else {**labelled, _INSIDE: inside}
-    variables = frozenset(flat.variables(asked.free) if flat else asked.free)
+    variables = _in_order(flat.variables(asked.free)) if flat else asked.free
     translator, within = Translator(), replace(asked, labelled=formulas, free=variables, effort=asked.effort // 3)
     found = _solve(translator, within)
     if found.status == "sat":
@@ -272,7 +277,7 @@ def _has_solution(asked: _Asked) -> bool:
         translator = Translator()
         fixed = asked.fixed(translator)
         facts = [translator.term(formula, fixed) for formula in formulas]
-        whole = [*translator.background(asked.free - set(fixed)), *facts]
+        whole = [*translator.background(v for v in asked.free if v not in fixed), *facts]
         return check(translator, whole, effort=asked.effort, seed=asked.seed).status == "sat"
     except (Unsupported, z3.Z3Exception):
         return False
