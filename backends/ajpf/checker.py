@@ -163,7 +163,7 @@ class Checker:
     laws: Laws = field(init=False)
 
     def __post_init__(self) -> None:
-        self.atoms = asked(self.properties)
+        self.atoms = _asked(self.properties)
         system = self.graph.system
         percepts = [p for _, group in system.environment.groups for p in group if p is not None]
         self.laws = standing([agent.program for agent in system.agents], percepts)
@@ -260,7 +260,7 @@ def label_states(system: System, states: Iterable[Any], wanted: Sequence[Atom]) 
     numbered = [(1 << at, atom) for at, atom in enumerate(wanted)]
     names = {agent.program.name: place for place, agent in enumerate(system.agents)}
     labels = [
-        Labels(agent, [(bit, atom) for bit, atom in numbered if atom.agent == name])
+        _Labels(agent, [(bit, atom) for bit, atom in numbered if atom.agent == name])
         for name, agent in zip(names, system.agents, strict=True)
     ]
     done = [(bit, names[a.agent], named_apart(a.term)) for bit, a in numbered if a.modality is Modality.DID]
@@ -304,7 +304,7 @@ def _of_draw(offered: Sequence[Struct], fair: Sequence[tuple[int, Struct]]) -> i
     return sum(bit | (bit << 1 if percept in offered else 0) for bit, percept in fair)
 
 
-class Labels:
+class _Labels:
     """The atoms that hold for one agent's beliefs, goals and intentions, as bits."""
 
     def __init__(self, agent: Agent, numbered: Sequence[tuple[int, Atom]]) -> None:
@@ -359,7 +359,7 @@ def _mental(frames: Iterable[Frame], wanted: Sequence[tuple[int, Modality, Term]
     return bits
 
 
-def asked(properties: Iterable[Property]) -> tuple[Atom, ...]:
+def _asked(properties: Iterable[Property]) -> tuple[Atom, ...]:
     """The atoms of the properties, their triggers, goals and forbidden formulas."""
     parts = (f for p in properties for f in (p.formula, p.trigger, p.goal, p.forbidden) if f is not None)
     return tuple(dict.fromkeys(atom for f in parts for atom in atoms(f)))

@@ -5,9 +5,9 @@ from __future__ import annotations
 import resource
 import time
 from array import array
-from collections.abc import Container, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 from .beliefs import TooDeep
 from .builtin import Crash
@@ -60,33 +60,23 @@ def _backlog(system: System, newest: Sequence[Any]) -> str:
     )
 
 
-class Reduced(Protocol):
-    """A subset of the runs that is equivalent to all for the properties (`partial.Reduction`)."""
-
-    def start(self) -> tuple[Any, ...]: ...
-    def successors(self, state: Any, known: Container[Any], /) -> tuple[Any, ...]: ...
-
-
 def explore(
     system: System,
     *,
     states: int = STATES,
     seconds: float = 60.0,
     megabytes: int = 4096,
-    reduced: Reduced | None = None,
 ) -> Graph:
-    """Every reachable state, breadth first, within the bounds (`Graph.unfinished`); with `reduced`, those on the runs
-    that it keeps."""
+    """Every reachable state, breadth first, within the bounds (`Graph.unfinished`)."""
     deadline = time.monotonic() + seconds
     memory = _memory() + megabytes
     table: Table[Any] = Table()
     found = table.all
     offsets, targets = array("i", [0]), array("i")
 
-    initial = tuple(dict.fromkeys(map(table.number, (reduced or system).start())))
+    initial = tuple(dict.fromkeys(map(table.number, system.start())))
     at = 0
     unfinished = None
-    successors = system.successors if reduced is None else lambda state: reduced.successors(state, table)
     while at < len(found):
         if len(found) > states:
             unfinished = f"more than {states} states"
@@ -98,7 +88,7 @@ def explore(
             unfinished += _backlog(system, found[-1_000:])
             break
         try:
-            reached = successors(found[at])
+            reached = system.successors(found[at])
         except (TooDeep, RecursionError):
             unfinished = "the agent's terms or reasoning rules nest too deeply, or ask for too much"
             break

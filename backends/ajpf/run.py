@@ -13,7 +13,6 @@ from avow.backend_kit.given import told
 from avow.backend_kit.protocol import Job, Limits, Report
 from avow.base.diagnostics import Rejected
 from avow.base.verdict import Counterexample, Verdict
-from avow.formulas.lasso import Lasso
 from avow.formulas.ltl import TooLarge
 from avow.isolation.observed import Observed, Seen
 from avow.isolation.outside import Outside
@@ -27,7 +26,6 @@ from .explore import Graph, System, explore
 from .instances import Instantiation, instances
 from .lazy import open_part
 from .options import Setup, read
-from .partial import Reduction, reduction, unfolded
 from .replay import Run, replay, sampled
 from .settle import Frame, Settled, outcome
 from .society import system
@@ -74,8 +72,6 @@ class _Run:
         self.bound: dict[str, Any] = {}
         self.checkers: dict[str, Checker] = {}
         """Property's key → the checker with the state space that it was checked on."""
-        self.reductions: dict[str, Reduction] = {}
-        """Property's key → the reduction of its checker's state space, if any."""
         self.engine = ENGINE
         self.logs: dict[str, str] = {}
         self.command: tuple[str, ...] = ()
@@ -111,13 +107,10 @@ class _Run:
     def explored(self, properties: Sequence[Property], probed: bool) -> None:
         setup = self.setup
         agents = system(setup.programs, setup.environment, setup.semantics, probed=probed)
-        reduced = reduction(agents, properties)
-        if reduced is not None:
-            self.bound["partial_order"] = "independent turns of agents in one order"
 
         def reached(states: int) -> Graph:
             megabytes = self.limits.megabytes
-            return explore(agents, states=states, seconds=self.left(), megabytes=megabytes, reduced=reduced)
+            return explore(agents, states=states, seconds=self.left(), megabytes=megabytes)
 
         graph = reached(min(LAZY_STATES, setup.states))
         if graph.unfinished is not None:
@@ -140,8 +133,6 @@ class _Run:
         for p in properties:
             self.results[p.key] = self.one(checker, p)
             self.checkers[p.key] = checker
-            if reduced is not None:
-                self.reductions[p.key] = reduced
 
     def settled_early(self, agents: System, p: Property) -> bool:
         """Whether the property was decided on the part of the state space that it needs (`lazy.open_part`)."""
@@ -205,21 +196,15 @@ class _Run:
         if lasso is None:  # the reduced and the whole graph disagree: never expected, never ignored
             self.results[refuted.key] = Settled(Verdict.ERROR, "the checker contradicts itself")
             return None
-        graph, lasso = self.whole(refuted.key, checker.graph, lasso)
-        found = explain(graph, lasso, refuted, self.wording)
+        found = explain(checker.graph, lasso, refuted, self.wording)
         self.counterexamples[refuted.key] = found
         self.logs[f"{refuted.key}.trace.txt"] = _trace(found)
-        return graph, lasso
-
-    def whole(self, key: str, graph: Graph, lasso: Lasso) -> Run:
-        """The run with the parts that a reduction leaves out."""
-        return unfolded(self.reductions[key], graph, lasso) if key in self.reductions else (graph, lasso)
+        return checker.graph, lasso
 
     def samples(self) -> Iterator[Run]:
-        spaces = {id(checker): (key, checker.graph) for key, checker in self.checkers.items()}
-        for key, graph in spaces.values():
+        for graph in {id(checker): checker.graph for checker in self.checkers.values()}.values():
             for lasso in sampled(graph, SAMPLED_RUNS):
-                yield self.whole(key, graph, lasso)
+                yield graph, lasso
 
     def replay(self, ajpf: Installation, runs: Sequence[tuple[str, Run]]) -> None:
         """AIL repeats the runs: if one differs, our interpreter disagrees with AIL's for this program, and there is no

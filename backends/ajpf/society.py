@@ -114,17 +114,17 @@ class Society:
             return looks
         if not any(state.awake):
             return tuple(dict.fromkeys(self._idle(state._replace(drawn=False))))
-        return tuple(dict.fromkeys(after for turn in self.turns(state) for after in self.moves(state, turn)))
+        return tuple(dict.fromkeys(after for turn in self._turns(state) for after in self._moves(state, turn)))
 
-    def turns(self, state: Common) -> tuple[int, ...]:
+    def _turns(self, state: Common) -> tuple[int, ...]:
         """The agents whose job may be next: all that are awake, once something has changed for any agent."""
         return tuple(place for place, up in enumerate(state.awake) if up) if state.changed else (state.turn,)
 
-    def moves(self, state: Common, turn: int) -> Iterator[Common]:
+    def _moves(self, state: Common, turn: int) -> Iterator[Common]:
         """The states after the next job of this agent."""
         return self._job(state._replace(changed=False, drawn=False, turn=turn))
 
-    def place(self, to: Term) -> int | None:
+    def _place(self, to: Term) -> int | None:
         """The index in `agents` of a message's receiver, if any."""
         return self._places.get(plain(name_of(to)))
 
@@ -224,7 +224,7 @@ class Society:
         assert isinstance(message, Struct)
         to, force, content = message.args
         state = state._replace(changed=True)
-        place = self.place(to)
+        place = self._place(to)
         if place is None:
             return state
         agent = self.agents[place]

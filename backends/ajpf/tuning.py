@@ -81,9 +81,6 @@ TAUTOLOGY_CASES = 4_000
 INDICES_TRIED = 400
 """Combinations of index values with which a row is tried in each step."""
 
-TURN = 1_000
-"""Jobs of one agent after which its turn is taken to be endless: the orders of turns are then not reduced."""
-
 LIVE_JOBS = 1_000
 """Steps of a running program without an action: after so many it is taken to be endless; a plan has some tens."""
 

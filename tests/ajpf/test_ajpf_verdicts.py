@@ -6,7 +6,7 @@ apart; those in `golden/random` were drawn by `small_agents`. Those in `golden/s
 are systems of two or three agents with AJPF's default scheduler: for each of them AJPF wrote down its whole model,
 which has the same runs (up to stuttering, in all that the properties speak of) as ours, and the verdicts are those of
 its model. So are those of s5004 and later ones in `golden/random`, of `cuts`, of r… (random programs with more
-features), and of l…, which `loose_societies` drew. A remark says where AJPF errs: its answer is not what
+features), and of l…, random systems with few messages. A remark says where AJPF errs: its answer is not what
 follows from the model that it writes down itself, and ours is; or, where the model was not written down, the
 program's first state alone breaks a property that AJPF says holds, and the remark says by what.
 """
