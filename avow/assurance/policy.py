@@ -26,7 +26,7 @@ from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.base.packaged import packaged
 from avow.base.records import dataclass
 from avow.base.suggestions import suggest
-from avow.base.verdict import Isolation, Link, Object, unsaid
+from avow.base.verdict import Isolation, Link, Object
 from avow.evidence.status import Status
 from avow.system.plan import Located, Numbers
 
@@ -255,8 +255,7 @@ class _PolicyReader:
     def statuses(
         self, data: object, path: tuple[str | int, ...], allowed: tuple[str, ...] = _GIVEN
     ) -> tuple[Status, ...]:
-        given = [unsaid(w) if isinstance(w, str) else w for w in data] if isinstance(data, list) else data
-        return tuple(Status(word) for word in self.words(given, allowed, path))
+        return tuple(Status(word) for word in self.words(data, allowed, path))
 
     def words(self, data: object, allowed: tuple[str, ...], path: tuple[str | int, ...]) -> tuple[str, ...]:
         found = self.texts(data, path)
@@ -298,7 +297,7 @@ class _PolicyReader:
     def ages(self, data: object, path: tuple[str | int, ...]) -> tuple[tuple[str, int], ...]:
         if not isinstance(data, Mapping):
             return (("all", self.count(data, path)),)
-        named = {unsaid(str(word)): self.count(days, (*path, word)) for word, days in data.items()}
+        named = {str(word): self.count(days, (*path, word)) for word, days in data.items()}
         self.faults += _unknown(named, (*_GIVEN, "all"), self.located, path)
         return tuple(named.items())
 
@@ -348,7 +347,7 @@ def _data() -> tuple[dict[str, Policy], dict[str, int], tuple[Technique, ...]]:
         raise Rejected(*faults)
     levels = ("sil1", "sil2", "sil3", "sil4")
     table = tuple(
-        Technique(row["name"], unsaid(row["verdict"]), tuple((level, row[level]) for level in levels))
+        Technique(row["name"], row["verdict"], tuple((level, row[level]) for level in levels))
         for row in data["techniques"]
     )
-    return policies, {unsaid(word): cost for word, cost in data["cost"].items()}, table
+    return policies, data["cost"], table

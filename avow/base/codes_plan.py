@@ -105,13 +105,6 @@ PLAN_CODES = register(
         warning=True,
     ),
     declare(
-        "PLAN139",
-        "old name",
-        "A key of the plan has a new name. The old one is read for one more release.",
-        "Write the new name.",
-        warning=True,
-    ),
-    declare(
         "PLAN130",
         "parameters",
         "The file under `source: parameters` is no mapping of numbers, truth values and texts.",

@@ -58,14 +58,6 @@ _SUPPORTING = frozenset(
 )
 
 
-_FORMER = {"observed": "monitored", "supposed": "justified", "linked": "argued"}
-
-
-def unsaid(word: str) -> str:
-    """The word of a verdict or status, also where a plan has the one of the last release; any other as it stands."""
-    return _FORMER.get(word, word)
-
-
 class Link(StrEnum):
     """How the thing that was verified hangs together with the contract's formula."""
 

@@ -23,7 +23,6 @@ from avow.pipeline.report_check import outdated
 from avow.pipeline.run_info import today
 from avow.report.explained import explained, left_out
 from avow.report.terminal import show_obligation
-from avow.system.names import renamed
 
 
 @click.command()
@@ -179,13 +178,12 @@ def find_claim(
         raise Rejected(Diagnostic("REPORT001", f"there is no report of {system} yet", hint=hint))
     known = [name for _, view in named for name in (short(view.id), view.id)]
     known += [name for case in cases for name in _names(case)]
-    today = renamed(wanted)
     guarantees = [short(view.id) for _, view in named if view.obligation.kind is Kind.GUARANTEE]
     such = f" (such as {guarantees[0]})" if guarantees else ""
     kinds = (
         f"a guarantee{such}, a requirement, node, assumption, gate or file, a diagnostic's code, a word of the report"
     )
-    hint = f"did you mean `{today}`?" if today else did_you_mean(wanted, known, 3) or f"known: {kinds}"
+    hint = did_you_mean(wanted, known, 3) or f"known: {kinds}"
     raise Rejected(Diagnostic("LEDGER002", f"nothing in the reports is called '{wanted}'", hint=hint))
 
 

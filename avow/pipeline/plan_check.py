@@ -50,7 +50,6 @@ def of_plan(
         *_model(system),
         *_policy(system),
         *requirement_sentences(system),
-        *system.plan.old_names,
         *without_words(system),
         *not_validated(system),
         *left_out(system),

@@ -71,7 +71,6 @@ def compose_slice(system: System) -> ComposeSlice:
     plan = replace(
         system.plan,
         title="",
-        old_names=(),
         contract_files=(),
         model=NOWHERE,
         messages=(),

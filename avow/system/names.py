@@ -3,7 +3,6 @@ scenario's values have the required types; all located."""
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Iterator
 
 from avow.base.diagnostics import Diagnostic, Rejected, Span
@@ -19,23 +18,6 @@ from avow.system.node_plan import check_memory
 from avow.system.plan import STEP_LENGTH, Plan
 from avow.system.statements import GENERAL
 from avow.system.strict_yaml import Piece
-
-_FORMER = {
-    "tautology": "not-tautological",
-    "vacuous": "not-vacuous",
-    "redundant": "not-redundant",
-    "unconstrained": "constrained",
-    "undetermined": "determined",
-    "unmeetable": "meetable",
-    "unneeded": "needed",
-}
-_FORMER_NAME = re.compile(rf"((?:^|/)(?:sanity|[^/]*\*[^/]*)/)({'|'.join(_FORMER)})(?=-|\*)")
-
-
-def renamed(obligation: str) -> str | None:
-    """The current id of a sanity claim, or pattern of such ids, given the old id with the fault; None for any other."""
-    today = _FORMER_NAME.sub(lambda found: found[1] + _FORMER[found[2]], obligation)
-    return today if today != obligation else None
 
 
 def check_names(plan: Plan, root: Piece, contract: Contract) -> tuple[Diagnostic, ...]:
@@ -213,10 +195,6 @@ def _findings(root: Piece, nodes: dict[str, Node]) -> Iterator[Diagnostic]:
             obligation = item.at("obligation")
             if obligation is None:
                 continue
-            for piece in (obligation, *item.each("matched")):
-                if today := renamed(piece.text):
-                    message = f"{key}: sanity's {piece.text!r} is now named by the good thing that it states"
-                    yield Diagnostic("PLAN106", message, piece.span, hint=f"write {today!r}")
             owner = obligation.text.split("/")[0]
             if owner not in nodes and owner != "system" and not set(owner) & set("*?["):
                 yield _unknown(f"{key}: node", owner, [*nodes, "system"], obligation.span)

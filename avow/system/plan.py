@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from avow.base import codec
-from avow.base.diagnostics import Diagnostic, Span
+from avow.base.diagnostics import Span
 from avow.base.files import sha256
 from avow.base.records import dataclass
 from avow.language.contract import Contract, Port
@@ -248,8 +248,7 @@ class Validation:
     sentence: str = ""
     """`Requirement.sentence_digest` as it was on that day."""
     formula: str = ""
-    """`Requirement.formula_digest` as it was on that day; empty in an entry of the last release, whose `sentence` is a
-    digest of both."""
+    """`Requirement.formula_digest` as it was on that day."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -288,20 +287,12 @@ class Requirement:
         """Whether a person has read the current sentence and formula."""
         if self.validation is None:
             return False
-        said = self.validation.sentence, self.validation.formula
-        return said in ((self.sentence_digest, self.formula_digest), (self._digest_of_both, ""))
+        return (self.validation.sentence, self.validation.formula) == (self.sentence_digest, self.formula_digest)
 
     @property
     def outdated(self) -> bool:
         """Whether a person has read an earlier sentence or formula."""
         return self.validation is not None and bool(self.validation.sentence) and not self.validated
-
-    @property
-    def _digest_of_both(self) -> str:
-        """The digest as the last release computed it."""
-        names = sorted(self.supported_by)
-        parts = (" ".join(self.text.split()), self.formula or "", self.temporal or "", *names, self.linked)
-        return sha256(repr(parts))[:16]
 
 
 @dataclass(frozen=True, slots=True)
@@ -433,8 +424,6 @@ class Plan:
     included: tuple[Path, ...] = ()
     """Files of hazards, launch files, and files of other systems that are included as subsystems: this plan depends on
     them too."""
-    old_names: tuple[Diagnostic, ...] = field(default=(), compare=False, repr=False)
-    """A warning for each key with its old name."""
     hazards: tuple[Hazard, ...] = ()
 
     @property

@@ -15,12 +15,10 @@ from typing import Any, TypeVar
 from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.base.files import inside, read_regular, sha256
 from avow.base.remembered import Shelf
-from avow.base.verdict import unsaid
 from avow.ros.names import Placed, Resolver, is_name
 from avow.system.hazards import read_hazards
 from avow.system.launched import read_launched
 from avow.system.node_plan import files_of, read_methods, read_source
-from avow.system.old_names import rename_old_keys
 from avow.system.plan import (
     ComposeGoal,
     Edge,
@@ -60,11 +58,10 @@ def read_plan(
     Raises Rejected if the file cannot be read or its shape is wrong; then no other fault is reported.
     """
     root, faults = _document(path) if text is None else read_yaml(text.encode("utf-8", "replace"), str(path))
-    old_names = rename_old_keys(root)
     faults += check_shape(root, shelf)
     if faults:
         raise Rejected(*faults)
-    reader = _PlanReader(path, root, old_names)
+    reader = _PlanReader(path, root)
     plan = reader.plan()
     return plan, root, tuple(reader.faults)
 
@@ -73,7 +70,6 @@ def read_rest(path: Path) -> tuple[Plan, Piece, tuple[Diagnostic, ...], frozense
     """As `read_plan`, without the pieces whose shape is wrong, and with the words in those: for finding further faults,
     never for verifying. Raises Rejected if the file is no document, or nothing of it is left."""
     root, faults = _document(path)
-    faults += rename_old_keys(root)
     faults += check_shape(root)
     rest, dropped = without_faults(root)
     if rest is None:
@@ -101,9 +97,8 @@ def bare_plan(name: str, files: tuple[Path, ...]) -> Plan:
 class _PlanReader:
     """Turns a well-shaped document into a `Plan`, noting what the schema cannot see."""
 
-    def __init__(self, path: Path, root: Piece, old_names: tuple[Diagnostic, ...] = ()) -> None:
+    def __init__(self, path: Path, root: Piece) -> None:
         self.path = path
-        self.old_names = old_names
         self.root = root
         self.faults: list[Diagnostic] = []
 
@@ -145,7 +140,6 @@ class _PlanReader:
             ros=self.noted(_ros(self.root)),
             launched=launched,
             included=(*hazard_files, *(launched.files if launched is not None else ())),
-            old_names=self.old_names,
         )
 
     def noted(self, read: tuple[T, Sequence[Diagnostic]]) -> T:
@@ -370,7 +364,7 @@ class _PlanReader:
             if found is not None and is_wild(texts["obligation"]):
                 message = f"{key}: {texts['obligation']!r} may stand for several, and  found  marks one finding"
                 self.fault("PLAN110", message, found.span, hint="name each obligation by itself")
-            said: dict[str, Any] = {"verdict": unsaid(texts.pop("verdict")), "matched": piece.texts("matched")}
+            said: dict[str, Any] = {"verdict": texts.pop("verdict"), "matched": piece.texts("matched")}
             yield Finding(**{**texts, **said}, span=piece.span)
 
 

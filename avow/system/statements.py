@@ -89,9 +89,9 @@ def said_otherwise(
         yield Diagnostic(found.code, found.message, span, Severity.WARNING, found.hint)
 
 
-def wrong_words(place: str, piece: Piece, done: tuple[str, ...] = ("date",)) -> Iterator[Diagnostic]:
-    """The faults in the persons, reasons and days of an entry; `done` are the days on which something was done."""
-    for key in ("who", "says", "because", "reason", *done, "until", "expires"):
+def wrong_words(place: str, piece: Piece) -> Iterator[Diagnostic]:
+    """The faults in the persons, reasons and days of an entry."""
+    for key in ("who", "says", "because", "reason", "date", "until", "expires"):
         part = piece.at(key)
         if part is None:
             continue
@@ -101,9 +101,9 @@ def wrong_words(place: str, piece: Piece, done: tuple[str, ...] = ("date",)) -> 
         elif key in ("says", "because", "reason"):
             wrong = f"{key} is blank" if is_blank(text) else ""
         else:
-            wrong = wrong_day(text, past=key in done)
-        if not wrong and key in ("until", "expires") and (begun := piece.at(done[0])) is not None and text < begun.text:
-            wrong = f"{key} is before the {done[0]} of the entry"
+            wrong = wrong_day(text, past=key == "date")
+        if not wrong and key in ("until", "expires") and (begun := piece.at("date")) is not None and text < begun.text:
+            wrong = f"{key} is before the date of the entry"
         if wrong:
             yield Diagnostic("PLAN105", f"{place}: {wrong}", part.span)
 

@@ -5,14 +5,13 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 
-from avow.system.old_names import VALIDATION_BEFORE
 from avow.system.plan import Requirement
 from avow.system.strict_yaml import Piece, read_yaml
 
 
 def with_validation(text: str, requirement: Requirement, who: str, date: str) -> str:
     """A plan's text in which a person has validated one of its requirements, as the requirement is now. The other keys
-    of the entry (`says`, `because`, `until`) are kept; entries of the last release become part of it."""
+    of the entry (`says`, `because`, `until`) are kept."""
     words = {
         "who": json.dumps(who, ensure_ascii=False),
         "date": date,
@@ -29,11 +28,6 @@ def with_validation(text: str, requirement: Requirement, who: str, date: str) ->
     if _is_flow(lines, piece):
         first = min(piece.keys.values(), key=lambda span: (span.line, span.column))
         return _spliced(lines, [((first.line, first.column), (first.line, first.column), f"{_entry(words)}, ")])
-    for old in VALIDATION_BEFORE:
-        if old in piece.entries:
-            for key, inner in (piece.entries[old].entries or {}).items():
-                if key in ("says", "because", "until"):
-                    words[key] = json.dumps(" ".join(inner.text.split()), ensure_ascii=False)
     return _added(lines, piece, words)
 
 
@@ -59,23 +53,16 @@ def _replaced(lines: list[str], entry: Piece, words: Mapping[str, str]) -> str:
 
 
 def _added(lines: list[str], piece: Piece, words: Mapping[str, str]) -> str:
-    """At the end of a requirement in block style, or replacing entries of the last release."""
-    starts = sorted((span.line, key) for key, span in piece.keys.items())
+    """At the end of a requirement in block style."""
     column = min(span.column for span in piece.keys.values()) - 1
-    end = starts[-1][0]
-    for number in range(starts[-1][0] + 1, len(lines) + 1):
+    end = last = max(span.line for span in piece.keys.values())
+    for number in range(last + 1, len(lines) + 1):
         line = lines[number - 1]
         if line.strip() and len(line) - len(line.lstrip()) < column:
             break
         end = number if line.strip() else end
-    gone: set[int] = set()
-    for at, (begin, key) in enumerate(starts):
-        if key in VALIDATION_BEFORE:
-            gone |= set(range(begin, starts[at + 1][0] if at + 1 < len(starts) else end + 1))
-    kept = [line for number, line in enumerate(lines[:end], 1) if number not in gone]
-    if kept and not kept[-1].endswith("\n"):
-        kept[-1] += "\n"
-    return "".join([*kept, f"{' ' * column}{_entry(words)}\n", *lines[end:]])
+    kept = "".join(lines[:end])
+    return "".join([kept, "" if kept.endswith("\n") else "\n", " " * column, _entry(words), "\n", *lines[end:]])
 
 
 def _spliced(lines: list[str], edits: list[tuple[tuple[int, int], tuple[int, int], str]]) -> str:

@@ -17,7 +17,7 @@ from reqif.parser import ReqIFParser
 
 from avow.assurance.model import Gate
 from avow.assurance.naming import short
-from avow.base.verdict import Object, Verdict, unsaid
+from avow.base.verdict import Object, Verdict
 from avow.evidence.obligation import Kind
 from avow.evidence.status import Status
 from avow.report import formats
@@ -184,8 +184,3 @@ def _sacm(text: str, kind: str) -> list[tuple[str, ElementTree.Element]]:
 
 def test_only_what_supports_a_claim_has_a_good_colour() -> None:
     assert {s for s in Status if tone(s) in ("good", "fair")} == {s for s in Status if s.supports}
-
-
-def test_a_plan_may_use_either_word() -> None:
-    for status in Status:
-        assert unsaid(status.value) == status.value

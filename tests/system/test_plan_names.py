@@ -25,7 +25,7 @@ RCL = "node made { inputs( r : REAL ) outputs( u : REAL ) topics() guarantee g (
                 "R": {
                     "text": "It is.",
                     "supported_by": ["made"],
-                    "confirmed": {"who": "…", "on": "2026-01-01", "sentence": "0"},
+                    "validation": {"who": "…", "date": "2026-01-01", "sentence": "0"},
                 }
             }
         },
@@ -42,7 +42,7 @@ RCL = "node made { inputs( r : REAL ) outputs( u : REAL ) topics() guarantee g (
             ],
         },
     ],
-    ids=["environment", "assumptions", "confirmed", "accepted"],
+    ids=["environment", "assumptions", "validation", "accepted"],
 )
 def test_a_name_that_nobody_can_read_signs_nothing(tmp_path: Path, who: str, place: dict[str, Any]) -> None:
     (tmp_path / "system.rcl").write_text(RCL)

@@ -78,14 +78,3 @@ def test_that_an_input_does_not_change_has_words_of_its_own(tmp_path: Path) -> N
         assert len(silent) == sum(not words for _, words in wanted)
     assert [d.code for d in faults(tmp_path / "x", A, entry.format(f"constant: {own}"))] == ["PLAN110"]
     assert [d.code for d in faults(tmp_path / "y", A, entry.format("constant: {says: It stays}"))] == ["PLAN104"]
-
-
-def test_a_key_of_an_old_name_is_read_as_the_new_one_with_a_warning(tmp_path: Path) -> None:
-    entry = "{compose.map: {says: The map fits}}"
-    old, new = (make(tmp_path / key, A, f"{key}: {entry}").plan for key in ("suppositions", "assumptions"))
-    assert old.statements == new.statements
-    (warned,) = old.old_names
-    assert warned.code == "PLAN139"
-    assert "`assumptions`" in warned.message
-    assert warned.span is not None
-    assert new.old_names == ()

@@ -12,7 +12,6 @@ from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.base.graphs import components, cycles_in
 from avow.system.graph import dataflow
 from avow.system.load import load_bare, load_path, load_system
-from avow.system.names import renamed
 from avow.system.plan import Endpoint, System
 from avow.system.rosgraph import account, read_ros_graph
 from avow.system.temporal import Operator, State, Temporal, parse_property, show_property
@@ -104,13 +103,6 @@ def test_faults_of_plan_and_contract_come_together(tmp_path: Path) -> None:
         ("scenario: {domains: {in.r: 0..100000000000}}", "PLAN109", 1, "more than 100000 values", ""),
         ("scenario: {domains: {REALS: 1}}", "PLAN106", 1, "REALS", "`REAL`"),
         ("expected: [{obligation: c/sanity/x, verdict: refuted}]", "PLAN106", 1, "'c'", "a, b, system"),
-        (
-            "expected: [{obligation: a/sanity/vacuous-g1, verdict: refuted}]",
-            "PLAN106",
-            1,
-            "good thing",
-            "not-vacuous-g1",
-        ),
         ("connections: [{from: a.x, to: b.x, delayed: true, initial: blue}]", "PLAN112", 1, "blue", ""),
         ("connections: [{from: a.x, to: b.x, delayed: true, initial: out.x > in.q}]", "PLAN112", 1, "is no value", ""),
         ("connections: [{from: a.x, to: b.x, delayed: true, initial: out.x > in.r}]", "PLAN112", 1, "of in.r", ""),
@@ -419,31 +411,3 @@ def test_a_sentence_that_was_changed_is_a_warning_with_what_to_write(tmp_path: P
     assert "in the future" in to_come.message
     listed = "expected: [{obligation: a/guarantee/g, verdict: refuted, matched: [a/guarantee/g]}]"
     assert [d.code for d in faults(tmp_path / "e", A, listed)] == ["PLAN110"]
-
-
-@pytest.mark.parametrize(
-    ("former", "today"),
-    [
-        ("a/sanity/vacuous-G1", "a/sanity/not-vacuous-G1"),
-        ("a/sanity/vacuous-*", "a/sanity/not-vacuous-*"),
-        ("*/redundant*", "*/not-redundant*"),
-        ("a/sanity/tautology-A1", "a/sanity/not-tautological-A1"),
-        ("a/sanity/unconstrained-x", "a/sanity/constrained-x"),
-        ("a/sanity/undetermined-x", "a/sanity/determined-x"),
-        ("a/sanity/unmeetable-A1", "a/sanity/meetable-A1"),
-        ("a/sanity/unneeded-A1", "a/sanity/needed-A1"),
-        *(
-            (name, None)
-            for name in (
-                "a/sanity/not-vacuous-G1",
-                "a/guarantee/redundant",
-                "system/composition/redundant-paths.entailed",
-                "a/sanity/*",
-                "a/sanity/realizable",
-            )
-        ),
-    ],
-)
-def test_a_plan_that_names_a_sanity_claim_by_its_fault_is_told_todays_name(former: str, today: str | None) -> None:
-    assert renamed(former) == today
-    assert not today or renamed(today) is None

@@ -10,7 +10,6 @@ from avow.cli import main
 from avow.system.load import load_system
 
 RCL = "node a { inputs( r : REAL ) outputs( x : REAL ) topics() guarantee g ( out.x <= 5 ) }\n"
-OLD = "confirmed: {who: B. Person, on: 2020-01-01, sentence: x}"
 STYLES = {
     "block": "requirements:\n  R:\n    text: It is low.  # said so\n    formula: a.x <= 5\n\n# the end\n",
     "block, at the end": "requirements:\n  R:\n    text: >-\n      It is\n      low.\n    formula: a.x <= 5",
@@ -19,9 +18,6 @@ STYLES = {
     "    validation:\n      because: it is so\n      who: B. Person\n      date: 2020-01-01\n",
     "validated before, flow": 'requirements: {R: {text: Low., formula: "a.x <= 5", '
     "validation: {who: B. P., date: 2020-01-01}}}\n",
-    "of the last release": f"requirements:\n  R:\n    text: It is low.\n    {OLD}\n    formula: a.x <= 5\n"
-    "    amounts:\n      says: It is low enough\n      because: it is so\n      who: B. Person\n"
-    "      date: 2020-01-01\n      until: 2030-01-01\n\npolicy: default\n",
 }  # fmt: skip
 
 
@@ -42,7 +38,6 @@ def test_a_validation_is_written_and_counts(tmp_path: Path, style: str, capsys: 
     assert cli("validate", tmp_path, "R", "--as", "A. Person") == 0
     found = load_system(tmp_path).plan
     assert found.requirements[0].validated
-    assert found.old_names == ()
     assert found.requirements[0].validation is not None
     assert found.requirements[0].validation.who == "A. Person"
     assert ("because" in STYLES[style]) == any(s.because == "it is so" for s in found.statements)
