@@ -139,7 +139,13 @@ def test_the_answer_as_json_is_one_document(name: str, place: Path) -> None:
     assert isinstance(json.loads(done.stdout), dict)
 
 
-@pytest.mark.parametrize("arguments", [["no-such"], ["check"], ["sanity", "no-such-system"], ["verify", "--seconds=0"]])
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        *(["no-such"], ["check"], ["sanity", "no-such-system"], ["report", "no-such-system"]),
+        *(["verify", "no-such-system"], ["verify", "--seconds=0"], ["verify", "-n", "-3"], ["init", "/proc/nowhere"]),
+    ],
+)
 def test_usage_and_input_that_are_wrong_end_with_2(
     arguments: list[str], place: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

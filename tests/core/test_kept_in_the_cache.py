@@ -56,16 +56,6 @@ def test_tables_that_somebody_else_wrote_are_not_even_loaded(tmp_path: Path, cac
     assert not mark.exists()
 
 
-def test_tables_of_another_grammar_do_not_stand_in(tmp_path: Path, cache: Path) -> None:
-    made = tables(tmp_path, cache)
-    (tmp_path / "other.lark").write_text(ORDERED.replace('"<="', '"<=" "b"?'))
-    first = made.read_bytes().partition(b"\n")[0]
-    lark_of.__wrapped__(tmp_path / "other.lark", "other", ("start",))
-    (other,) = cache.glob("other-*.lark")
-    made.write_bytes(first + b"\n" + other.read_bytes().partition(b"\n")[2])
-    tables(tmp_path, cache)
-
-
 def test_kept_tables_are_used(tmp_path: Path, cache: Path) -> None:
     made = tables(tmp_path, cache)
     before = made.stat().st_mtime_ns
@@ -132,20 +122,6 @@ def test_a_version_is_asked_again_when_any_part_of_the_program_is_another(
     os.utime(path, ns=(before.st_atime_ns, before.st_mtime_ns))
     assert path.stat().st_size == before.st_size
     assert version() == {"engine": "2.4.0", "madetool": "b"}[edited]
-
-
-@pytest.mark.parametrize("special", ["pipe", "device", "folder"])
-def test_what_is_no_file_is_no_key_and_nobody_waits_for_it(tmp_path: Path, cache: Path, special: str) -> None:
-    cache.mkdir(parents=True)
-    match special:
-        case "pipe":
-            os.mkfifo(cache / "notes.key")
-        case "device":
-            (cache / "notes.key").symlink_to("/dev/zero")
-        case _:  # a folder
-            (cache / "notes.key").mkdir()
-    write_note(tmp_path / "note.json", {"a": 1})
-    assert read_note(dict[str, int], tmp_path / "note.json") == {"a": 1}
 
 
 def test_a_user_without_a_home_keeps_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

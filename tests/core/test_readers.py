@@ -13,6 +13,7 @@ from enum import StrEnum
 from typing import Any
 
 import pytest
+from core.test_codec import Outer
 
 from avow.backends.ajpf.ajpf_tool import Answer
 from avow.backends.fuzz import runner
@@ -41,7 +42,7 @@ KINDS: list[Any] = [
     runner.Shown,
 ]
 KINDS += [Answer, _Wanted, Line, _Word, Certificate, Checked, _Settled, Stamp, Rendering, _Overview, Listing]
-KINDS += [_Known, _Digest, _Report, _Export, _Envelope]
+KINDS += [_Known, _Digest, _Report, _Export, _Envelope, Outer]
 
 
 def sample(kind: Any) -> Any:

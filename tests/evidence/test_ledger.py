@@ -136,6 +136,15 @@ def test_a_head_that_is_none_is_damage(tmp_path: Path, head: str) -> None:
     assert [d.reason for d in Ledger(tmp_path / "x.jsonl").damage] == ["x.jsonl.head cannot be read"]
 
 
+@pytest.mark.parametrize("kept", [1, 2])
+def test_a_cut_is_not_healed_by_the_next_record(tmp_path: Path, kept: int) -> None:
+    path = tmp_path / "x.jsonl"
+    Ledger(path).append_all(some(3))
+    path.write_bytes(b"".join(path.read_bytes().splitlines(keepends=True)[:kept]))
+    Ledger(path).append_all([evidence(f"node.new{n}", key=f"new{n}") for n in range(6)])
+    assert Ledger(path).damage
+
+
 def test_a_ledger_rechained_after_an_edit_is_given_away_by_its_head(tmp_path: Path) -> None:
     path = tmp_path / "x.jsonl"
     Ledger(path).append_all([*some(2), evidence("node.bad", Verdict.REFUTED)])

@@ -434,6 +434,15 @@ def test_hostile_names_stay_names(tmp_path: Path) -> None:
     assert set(verdicts(wanted).values()) == {Verdict.PROVED}
 
 
+def test_a_name_may_begin_as_a_keyword_does(tmp_path: Path) -> None:
+    rcl = """
+    node sensor { inputs( in' : NATURAL, or' : BOOL ) outputs( not' : NATURAL, do_it : BOOL ) topics()
+      guarantee same ( out.not' == in.in' ) guarantee flag ( out.do_it <=> not in.or' ) }
+    """
+    program = "not' := in'\nIF or' or not or' THEN\n   do_it := not or'\nELSE\n   do_it := TRUE\n"
+    assert set(verdicts(job(tmp_path, rcl, program)).values()) == {Verdict.PROVED}
+
+
 @pytest.mark.parametrize("depth", [60, 400, 3000])
 def test_deep_contracts_do_not_crash(tmp_path: Path, depth: int) -> None:
     deep = "not (" * depth + "out.ok" + ")" * depth

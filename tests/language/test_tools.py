@@ -260,22 +260,6 @@ def test_answers() -> None:
     assert [(s.name, s.detail) for s in outline[2].inner] == [("fine", "It is *fine*")]
 
 
-def test_answers_while_typing() -> None:
-    """What can be read of a broken text still helps; and no text, and no place in it, brings an exception."""
-    from avow.lsp.features import analyse, definition, hover, symbols
-
-    broken = TEXT.replace("stat == red and", "stat == ")
-    document = analyse(broken, "f")
-    assert document.diagnostics
-    assert "`out.stat`" in (hover(document, at(broken, "stat == ")) or "")
-    for cut in range(0, len(TEXT), 7):
-        document = analyse(TEXT[:cut], "f")
-        symbols(document)
-        for offset in range(0, cut, 5):
-            hover(document, offset)
-            definition(document, offset)
-
-
 def test_standing_of_a_guarantee(workspace: Path) -> None:
     """Hovering shows each method's latest verdict from the ledger, and nothing where there is none."""
     from avow.base.verdict import Link, Verdict
@@ -298,54 +282,6 @@ def test_standing_of_a_guarantee(workspace: Path) -> None:
     assert standing(str(folder / "f.rcl"))("n", "fine") == "last time: proved by dafny (2026-11-21 10:00)"
     assert standing(str(folder / "f.rcl"))("n", "other") is None
     assert standing(str(workspace / "f.rcl"))("n", "fine") is None
-
-
-@pytest.mark.nightly
-def test_server_speaks_the_protocol(tmp_path: Path) -> None:
-    pytest.importorskip("pygls")
-    path = tmp_path / "f.rcl"
-    text = "// 🤖 é\n" + TEXT.replace("red and", "rde and")
-    path.write_text(text, "utf-8")
-    uri = path.as_uri()
-    place = {"line": 4, "character": 12}
-    requests = [
-        {"id": 1, "method": "initialize", "params": {"processId": None, "rootUri": None, "capabilities": {}}},
-        {"method": "initialized", "params": {}},
-        {
-            "method": "textDocument/didOpen",
-            "params": {"textDocument": {"uri": uri, "languageId": "rcl", "version": 1, "text": text}},
-        },
-        {"id": 2, "method": "textDocument/documentSymbol", "params": {"textDocument": {"uri": uri}}},
-        {"id": 3, "method": "textDocument/definition", "params": {"textDocument": {"uri": uri}, "position": place}},
-        {
-            "id": 4,
-            "method": "textDocument/formatting",
-            "params": {"textDocument": {"uri": uri}, "options": {"tabSize": 2, "insertSpaces": True}},
-        },
-        {"id": 5, "method": "shutdown"},
-        {"method": "exit"},
-    ]
-    data = b""
-    for request in requests:
-        body = json.dumps({"jsonrpc": "2.0", **request}).encode()
-        data += b"Content-Length: %d\r\n\r\n%s" % (len(body), body)
-    done = subprocess.run(
-        [sys.executable, "-m", "avow", "lsp"], input=data, capture_output=True, timeout=60, check=False
-    )
-    answers = []
-    rest = done.stdout
-    while rest:
-        head, _, rest = rest.partition(b"\r\n\r\n")
-        length = int(next(h for h in head.split(b"\r\n") if h.startswith(b"Content-Length")).split(b":")[1])
-        answers.append(json.loads(rest[:length]))
-        rest = rest[length:]
-    by_id = {a["id"]: a.get("result") for a in answers if "id" in a and "method" not in a}
-    assert [s["name"] for s in by_id[2]] == ["Stat", "Limit", "n"]
-    published = [a["params"] for a in answers if a.get("method") == "textDocument/publishDiagnostics"]
-    (error,) = [d for d in published[0]["diagnostics"] if d["severity"] == 1]
-    assert error["code"] == "RCL201"
-    assert error["range"]["start"] == {"line": 6, "character": 73}
-    assert by_id[4] == [] or "guarantee fine" in by_id[4][0]["newText"]
 
 
 def test_checking_does_not_import_the_solver(root: Path) -> None:

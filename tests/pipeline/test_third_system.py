@@ -10,16 +10,6 @@ import sys
 from pathlib import Path
 
 import pytest
-from calculus.make import discharge as discharge_composition
-
-from avow.backend_kit.protocol import Limits
-from avow.base.files import write
-from avow.base.verdict import Outcome, Verdict
-from avow.pipeline.methods import method_backend, method_job
-from avow.pipeline.slices import SanitySlice
-from avow.pipeline.work import Work, planned_method
-from avow.pipeline.worker import discharge_sanity
-from avow.pipeline.workload import Survey, survey
 
 FERRY = Path(__file__).parent / "fixtures" / "ferry"
 
@@ -44,46 +34,6 @@ def verify(folder: Path) -> tuple[int, dict[tuple[str, str], dict[str, object]],
     records = [json.loads(line)["evidence"] for line in lines]
     found = {(r["obligation"].removeprefix("ferry/"), r["method"]): r for r in records}
     return done.returncode, found, done.stdout + done.stderr
-
-
-def settle(work: Work, folder: Path) -> tuple[Outcome, ...]:
-    """What a worker does, here: `doit verify` starts some twenty processes for it."""
-    limits = Limits(seconds=60)
-    match work.engine:
-        case "language":
-            return ()
-        case "sanity":
-            assert work.cut is not None
-            cut = work.cut()
-            assert isinstance(cut, SanitySlice)
-            return discharge_sanity(cut, work.obligations, limits).outcomes
-        case "compose":
-            return discharge_composition(work.system, work.obligations, limits)
-    method = planned_method(work)
-    backend = method_backend(work.system, method)
-    job = method_job(work.system, work.system.contract.node(work.node), method)
-    assert not [d for d in backend.check(job) if d.is_error]
-    for name, text in backend.export(job).items():
-        write(folder / name, text)
-    return backend.discharge(job, folder, limits).outcomes
-
-
-@pytest.mark.nightly
-def test_each_engine_settles_its_part(tmp_path: Path) -> None:
-    system = survey(FERRY)
-    assert isinstance(system, Survey)
-    found = {
-        (outcome.obligation.removeprefix("ferry/"), work.method): outcome.verdict
-        for work in system.catalogue.works
-        for outcome in settle(work, tmp_path / work.node / work.method)
-    }
-    assert found["gauge/guarantee/good", "hoare"] is Verdict.PROVED
-    assert found["gauge/guarantee/good", "hypothesis"] is Verdict.TESTED
-    assert found["pilot/guarantee/docks", "ajpf"] is Verdict.CHECKED
-    assert found["pilot/guarantee/docks", "hypothesis"] is Verdict.TESTED
-    assert found["pilot/sanity/realizable", "sanity"] is Verdict.PROVED
-    assert found["system/requirement/SAFE", "compose"] is Verdict.PROVED
-    assert not {Verdict.UNKNOWN, Verdict.ERROR, Verdict.NOT_RUN} & set(found.values())
 
 
 @pytest.mark.nightly

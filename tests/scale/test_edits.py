@@ -82,3 +82,7 @@ def test_clean_removes_what_is_made_again_and_no_evidence(place: Path) -> None:
 @pytest.mark.parametrize("verb", ["forget", "ignore"])
 def test_what_is_about_doits_memory_says_why_not(place: Path, verb: str) -> None:
     assert "avow verify --fresh" in doit(place, verb, code=2)
+
+
+def test_no_process_at_all_is_not_nothing_to_do(place: Path) -> None:
+    assert "not all of it was run" in doit(place, "-n", "-3", "verify", code=2)
