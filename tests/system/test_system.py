@@ -118,12 +118,10 @@ def test_names_and_formulas_of_a_plan(tmp_path: Path, plan: str, code: str, line
     assert hint in (match[0].hint or "")
 
 
-def test_every_code_is_declared_documented_and_triggered() -> None:
+def test_every_code_is_declared_and_triggered() -> None:
     sources = [*(ROOT / "avow/system").glob("*.py"), *(ROOT / "avow/calculus").glob("*.py")]
     used = {code for path in sources for code in re.findall(r"PLAN\d{3}", path.read_text())}
     assert used == set(PLAN_CODES)
-    page = (ROOT / "docs/plan.md").read_text()
-    assert all(f"| {code.code} | {code.title} |" in page for code in PLAN_CODES.values())
     tests = "".join(
         path.read_text() for folder in ("system", "calculus") for path in (ROOT / "tests" / folder).glob("*.py")
     )
