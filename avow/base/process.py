@@ -16,7 +16,7 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -238,8 +238,8 @@ def forget_orphans() -> None:
     here.running.clear()
 
 
-def end_orphans(own: Collection[int] = ()) -> bool:
-    """Kill all adopted children until none is left; whether there was any but these `own`. See `adopt_orphans`."""
+def end_orphans() -> bool:
+    """Kill all adopted children until none is left; whether there was any. See `adopt_orphans`."""
     if here.adopted_since is None:
         return False
     found = False
@@ -249,7 +249,7 @@ def end_orphans(own: Collection[int] = ()) -> bool:
         orphans = [pid for pid in children(os.getpid()) if pid not in expected]
         if not orphans:
             return found
-        found = found or any(pid not in own for pid in orphans)
+        found = True
         for pid in orphans:
             kill_tree(pid)
         for pid in orphans:

@@ -18,19 +18,16 @@ from avow.base.rendering import printable, render
 from avow.base.tuning.shown import WARNINGS
 from avow.base.workspace import Workspace
 from avow.pipeline import export as exporting
-from avow.pipeline.methods import is_portable, method_backend
 from avow.pipeline.plan_check import diagnostics, left_out
 from avow.pipeline.state import task_name
-from avow.pipeline.work import Work, planned_method
 from avow.pipeline.workload import Survey
 
 
 @dataclass(frozen=True, slots=True)
 class Checked:
-    """The input of the last check, its warnings, and the keys of the methods without a finding."""
+    """The input of the last check, and the keys of the methods without a finding."""
 
     key: str
-    warnings: tuple[str, ...]
     clean: tuple[str, ...]
 
 
@@ -40,27 +37,20 @@ def is_current(workspace: Workspace, surveyed: Survey) -> bool:
 
 
 def check(workspace: Workspace, surveyed: Survey) -> None:
-    """Raises Rejected with all errors; warnings go into the report, the first few also to the terminal. A method
-    without a finding is not checked again while its slice is the same."""
-    keys = {(w.node, w.method): exporting.key(w) for w in surveyed.catalogue.works if _depends_on_slice(w)}
+    """Raises Rejected with all errors; the first few warnings go to the terminal. A method without a finding is not
+    checked again while its slice is the same, if the result depends on nothing else."""
+    keys = {(w.node, w.method): exporting.key(w) for w in surveyed.catalogue.works if not w.is_engine and w.is_portable}
     before = read_note(Checked, _stamp(workspace, surveyed))
     known = set(before.clean) if before is not None else set()
     clean = {name for name, key in keys.items() if key in known}
     found = diagnostics(surveyed.system, clean, surveyed.shelf)
     if surveyed.shelf is not None:
         surveyed.shelf.keep()
-    errors = tuple(d for d in found if d.is_error)
-    if errors:
+    if any(d.is_error for d in found):
         raise Rejected(*found)
-    warnings = tuple(f"{d.span}: {d.message} [{d.code}]" for d in found if d.severity is Severity.WARNING)
     _tell(workspace, surveyed.system.name, found)
     kept = tuple(sorted(keys[name] for name in clean if name in keys))
-    write_note(_stamp(workspace, surveyed), Checked(_key(surveyed), warnings, kept))
-
-
-def _depends_on_slice(work: Work) -> bool:
-    """Whether the result of its check depends on nothing else."""
-    return not work.is_engine and is_portable(method_backend(work.system, planned_method(work)))
+    write_note(_stamp(workspace, surveyed), Checked(_key(surveyed), kept))
 
 
 def _tell(workspace: Workspace, system: str, found: Iterable[Diagnostic]) -> None:

@@ -23,11 +23,10 @@ from avow.evidence.obligation import Obligation
 from avow.evidence.record import CASE, ISOLATION, OBSERVED, RETRY, Evidence
 from avow.pipeline import dispatch
 from avow.pipeline.export import folder, generated
-from avow.pipeline.methods import method_backend, method_job
 from avow.pipeline.recheck import still_counts
 from avow.pipeline.run_info import Run
 from avow.pipeline.state import State
-from avow.pipeline.work import LANGUAGE, Work, planned_method
+from avow.pipeline.work import LANGUAGE, Work
 
 Intact = Callable[[str, str], bool]
 
@@ -89,7 +88,9 @@ def discharge(workspace: Workspace, work: Work, run: Run) -> tuple[Outcome, ...]
     )
     seconds = time.monotonic() - clock
     outputs = _keep_logs(workspace, work, todo, report)
-    strength, link, of = _promise(work)
+    tool = work.planned[0] if work.planned is not None else None
+    promised = (tool.strength, tool.link, tool.of) if tool else (Verdict.PROVED, Link.GENERATED, Object.MODEL)
+    strength, link, of = promised
     inputs = _inputs(workspace, work)
     by_id = {o.id: o for o in todo}
     records = []
@@ -153,21 +154,12 @@ def _language(obligations: tuple[Obligation, ...]) -> Report:
     return Report(outcomes, "avow", __version__)
 
 
-def _promise(work: Work) -> tuple[Verdict, Link, Object]:
-    if work.is_engine:
-        return Verdict.PROVED, Link.GENERATED, Object.MODEL
-    method = planned_method(work)
-    tool = method_backend(work.system, method)
-    return tool.strength, tool.link, tool.of
-
-
 def _inputs(workspace: Workspace, work: Work) -> dict[str, str]:
     """The files written by a person that the answer rests on. The contract itself enters by the obligation's digest."""
-    if work.is_engine:
+    if work.planned is None:
         return {}
-    system = work.system
-    method = planned_method(work)
-    files = method_backend(system, method).files(method_job(system, system.contract.node(work.node), method))
+    tool, job = work.planned
+    files = tool.files(job)
     return {workspace.relative(path): digest_file(path) for path in files if path.is_file()}
 
 

@@ -26,10 +26,10 @@ from avow.evidence.obligation import Obligation
 from avow.evidence.record import RETRY
 from avow.isolation.observed import Observed, Seen
 from avow.pipeline.blobs import encode
-from avow.pipeline.methods import is_portable, method_backend, tool_identities
+from avow.pipeline.methods import tool_identities
 from avow.pipeline.requests import Altered, Request, Response
 from avow.pipeline.run_info import Run
-from avow.pipeline.work import COMPOSE, Work, engine_identity, planned_method
+from avow.pipeline.work import COMPOSE, Work, engine_identity
 
 CHANGED = "contract, plan or a model changed while it was being verified; run it again"
 
@@ -63,7 +63,7 @@ def settle(
     if not others:
         return report
     worker = one_line(response.worker)[:64]
-    if not work.is_engine and tool_identities(method_backend(work.system, planned_method(work))) != work.tools:
+    if work.planned is not None and tool_identities(work.planned[0]) != work.tools:
         return _undeclared(report, others, worker)
     what = f"{work.engine} used {_on(worker, others[0])}, which is not so on this machine, or cannot be recorded"
     run.remote.warn(f"{what}: what depends on the like is done again here")
@@ -91,9 +91,7 @@ def _here(workspace: Workspace, work: Work, obligations: tuple[Obligation, ...],
 
 def _lacking(work: Work, run: Run) -> tuple[str, ...]:
     """The tools of a job, as if the remote executor had none."""
-    if run.offered is None or work.is_engine or not work.tools:
-        return ()
-    if not is_portable(method_backend(work.system, planned_method(work))):
+    if run.offered is None or not work.tools or not work.is_portable:
         return ()
     wanted = [name for name, *_ in work.tools]
     return () if any(name in run.offered for name in wanted) else tuple(wanted)
@@ -105,7 +103,6 @@ def request_of(
     """Raises OSError for a file of the plan that cannot be read."""
     assert work.cut is not None
     root = work.system.plan.root.absolute()
-    portable = work.is_engine or is_portable(method_backend(work.system, planned_method(work)))
     files = {path.absolute().relative_to(root).as_posix(): read_regular(path) for path in work.files if path.is_file()}
     return Request(
         work.system.name,
@@ -116,9 +113,9 @@ def request_of(
         work.limits,
         encode(work.cut(), root),
         workspace.relative(root),
-        files if portable else {},
+        files if work.is_portable else {},
         work.tools,
-        "" if portable else str(root),
+        "" if work.is_portable else str(root),
         workspace.relative(folder),
         altered,
     )

@@ -20,10 +20,10 @@ from avow.base.tuning.running import SETTLED_NS
 from avow.base.workspace import Workspace
 from avow.language.contract import Node
 from avow.pipeline.blobs import encode
-from avow.pipeline.methods import method_backend, method_job
+from avow.pipeline.methods import method_job
 from avow.pipeline.processes import Processes
 from avow.pipeline.slices import MethodSlice, whole_node
-from avow.pipeline.work import Work, planned_method
+from avow.pipeline.work import Work
 
 STAMP = ".export.json"
 
@@ -99,10 +99,10 @@ def generated(work: Work) -> Mapping[str, str]:
     assert work.shown is not None
     cut = work.shown()
     assert isinstance(cut, MethodSlice)
-    tool = method_backend(work.system, planned_method(work))
+    assert work.planned is not None
     method = cut.system.plan.node(cut.node).methods[0]
     job = method_job(cut.system, cut.system.contract.node(cut.node), method)
-    return one_step.export(tool, job)
+    return one_step.export(work.planned[0], job)
 
 
 def export(workspace: Workspace, work: Work, key: str, processes: Processes | None = None) -> tuple[str, ...]:

@@ -25,10 +25,9 @@ from avow.evidence.ledger import ledger_of
 from avow.evidence.obligation import Kind, Obligation
 from avow.evidence.record import RETRY, Evidence
 from avow.pipeline import dispatch
-from avow.pipeline.methods import method_backend
 from avow.pipeline.requests import Altered, chosen
 from avow.pipeline.run_info import Run
-from avow.pipeline.work import Work, planned_method
+from avow.pipeline.work import Work
 from avow.sanity.mutants import Difference, Mutant, difference
 
 _Task = tuple[Work, Obligation, Evidence]
@@ -84,10 +83,7 @@ def hunt(workspace: Workspace, works: tuple[Work, ...], run: Run, limit: int, jo
 
 
 def _reads_formulas(work: Work) -> bool:
-    if work.is_engine:
-        return False
-    method = planned_method(work)
-    return method_backend(work.system, method).link is not Link.GUIDED
+    return work.planned is not None and work.planned[0].link is not Link.GUIDED
 
 
 def _tasks(workspace: Workspace, work: Work) -> list[_Task]:

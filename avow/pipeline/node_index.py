@@ -21,8 +21,7 @@ from avow.evidence.status import Status
 from avow.language.contract import Node
 from avow.language.definitions import show_clause
 from avow.pipeline.export import folder, read_stamp
-from avow.pipeline.methods import method_backend, method_job
-from avow.pipeline.work import Work, planned_method
+from avow.pipeline.work import Work
 from avow.report.short import escaped
 
 INDEX = "index.md"
@@ -80,8 +79,8 @@ def _checks(workspace: Workspace, work: Work) -> tuple[OutsideCheck, ...] | str:
     stamp = read_stamp(folder(workspace, work))
     if stamp is None:
         return "nothing was generated"
-    tool, method = method_backend(work.system, planned_method(work)), planned_method(work)
-    job = method_job(work.system, work.system.contract.node(work.node), method)
+    assert work.planned is not None
+    tool, job = work.planned
     try:
         return tuple(tool.outside_checks(job, folder(workspace, work).resolve(), tuple(stamp.files)))
     except Rejected as wrong:  # the verdict reports a fault of the method's input

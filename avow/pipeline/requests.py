@@ -77,8 +77,6 @@ class Response:
     timed_out: bool = False
     worker: str = ""
     """The machine's name."""
-    cpu: float = 0.0
-    """Processor seconds."""
     log: str = ""
     """What the process wrote to standard error."""
 

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from avow.backend_kit.linked import beside
-from avow.backend_kit.protocol import Job, Limits
+from avow.backend_kit.protocol import Backend, Job, Limits
 from avow.base.diagnostics import Diagnostic, Rejected, Severity
 from avow.base.files import digest_or_missing, sha256
 from avow.base.records import dataclass
@@ -30,7 +30,7 @@ from avow.language.contract import Contract, Node
 from avow.pipeline.blobs import encode
 from avow.pipeline.engine_code import backend_digest, engine_digest
 from avow.pipeline.evidence_keys import method_options, surroundings
-from avow.pipeline.methods import Offered, guarantee, method_backend, method_job, tool_identities
+from avow.pipeline.methods import Offered, guarantee, is_portable, method_backend, method_job, tool_identities
 from avow.pipeline.settings import asked_seconds
 from avow.pipeline.slices import SanitySlice, Slice, compose_slice, method_slice, sanity_slice
 from avow.sanity.claims import claims, node_key, recall
@@ -63,6 +63,8 @@ class Work:
     """The plan's files that the answer depends on."""
     tools: tuple[tuple[str, str, str], ...] = field(default=(), compare=False, repr=False)
     """The identities of the outside tools that the answer depends on."""
+    planned: tuple[Backend, Job] | None = field(default=None, compare=False, repr=False)
+    """A method's backend, and the job that it gets; None for the core's own engines."""
     texts: str = field(default="", compare=False, repr=False)
     """The digest of the plan's and the contract's texts."""
 
@@ -76,7 +78,12 @@ class Work:
 
     @property
     def is_engine(self) -> bool:
-        return self.engine in ENGINES
+        return self.planned is None
+
+    @property
+    def is_portable(self) -> bool:
+        """Whether it can run on another machine."""
+        return self.planned is None or is_portable(self.planned[0])
 
 
 def _language_work(system: System) -> Work:
@@ -188,7 +195,7 @@ def method_work(system: System, node: Node, method: Method, offered: Offered = N
         shown=lambda: method_slice(tool, job, files, sentences=True),
         files=files,
     )
-    return replace(work, tools=tools)
+    return replace(work, tools=tools, planned=(tool, job))
 
 
 def _compared(system: System, job: Job) -> tuple[str, ...]:
@@ -233,14 +240,9 @@ def _limits(method: Method, options: Mapping[str, Any]) -> Limits:
     return replace(Limits(), **given)
 
 
-def planned_method(work: Work) -> Method:
-    """The plan's method of a job; not for the core's own engines."""
-    return next(m for m in work.system.plan.node(work.node).methods if m.id == work.method)
-
-
 def programs(works: Iterable[Work]) -> tuple[str, ...]:
     """The paths of the outside tools that these jobs use."""
-    used = (method_backend(work.system, planned_method(work)) for work in works if not work.is_engine)
+    used = (work.planned[0] for work in works if work.planned is not None)
     return tuple(dict.fromkeys(place for backend in used for tool in backend.tools() for place in tool.places))
 
 

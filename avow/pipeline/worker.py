@@ -8,7 +8,6 @@ verdict. Two workers use two cores despite Python's global lock.
 from __future__ import annotations
 
 import json
-import os
 import platform
 import sys
 import tempfile
@@ -35,7 +34,7 @@ from avow.evidence.record import REMARKS, RETRY
 from avow.pipeline import recheck
 from avow.pipeline.blobs import Garbled, decode
 from avow.pipeline.dispatch import ANSWERS, CHANGED, read_answers, write_answers
-from avow.pipeline.methods import method_backend, method_job, tool_identities
+from avow.pipeline.methods import method_job, tool_identities
 from avow.pipeline.requests import (
     Request,
     Response,
@@ -47,7 +46,7 @@ from avow.pipeline.requests import (
     response_bytes,
 )
 from avow.pipeline.slices import ComposeSlice, MethodSlice, SanitySlice, Slice
-from avow.pipeline.work import COMPOSE, SANITY, Work, compose_work, method_work, planned_method, sanity_claims
+from avow.pipeline.work import COMPOSE, SANITY, Work, compose_work, method_work, sanity_claims
 from avow.sanity import results
 from avow.sanity.analysis import outcomes
 from avow.solving.checking import z3_version
@@ -85,10 +84,8 @@ def answer(asked: bytes) -> bytes:
             report = replace(report, outcomes=tuple(map(_asked_again, report.outcomes)))
         process.end_orphans()  # no process of a tool or program under test outlives the answer
         told = json.dumps(to_json(report), default=str).replace(f"{place}/", "")
-        spent = os.times()
-        cpu = spent.user + spent.system + spent.children_user + spent.children_system
     report = from_json(Report, json.loads(told))
-    return response_bytes(Response(digest, report, worker=platform.node(), cpu=round(cpu, 3)))
+    return response_bytes(Response(digest, report, worker=platform.node()))
 
 
 def _asked_again(outcome: Outcome) -> Outcome:
@@ -161,19 +158,19 @@ def _claims(request: Request, obligations: Sequence[Obligation], keys: Mapping[s
 
 
 def _discharge(request: Request, system: System, work: Work) -> Report:
-    node, method = system.contract.node(work.node), planned_method(work)
-    tool = method_backend(system, method)
+    assert work.planned is not None
+    tool, job = work.planned
     here = tool_identities(tool)
     if here != request.tools:
         raise Refused(f"the tools are not those of the key: {_shown(here)} here, {_shown(request.tools)} wanted")
     claims = _claims(request, work.obligations, work.keys)
     folder = Path(request.folder)
     if request.altered:
-        system = alter(system, node, request.altered)
-        node = system.contract.node(node.name)
-        for name, text in one_step.export(tool, method_job(system, node, method)).items():
+        system = alter(system, job.node, request.altered)
+        job = method_job(system, system.contract.node(work.node), job.method)
+        for name, text in one_step.export(tool, job).items():
             write(folder / name, text)
-    job, wanted = method_job(system, node, method), {o.id for o in claims}
+    wanted = {o.id for o in claims}
     job = replace(
         job,
         obligations=tuple(o for o in job.obligations if o.id in wanted),

@@ -24,9 +24,8 @@ from avow.calculus.discharge import Bounds
 from avow.calculus.requirements import FormulaQuestion, TemporalQuestion, requirement_question
 from avow.calculus.variables import frame
 from avow.pipeline.evidence_keys import surroundings
-from avow.pipeline.methods import method_job
 from avow.pipeline.slices import compose_slice, method_slice, sanity_slice
-from avow.pipeline.work import catalogue, planned_method
+from avow.pipeline.work import catalogue
 from avow.pipeline.worker import discharge_sanity
 from avow.pipeline.workload import survey
 from avow.system.load import load_system
@@ -283,8 +282,8 @@ def test_who_says_that_it_needs_no_steps_does_not_look_at_them(tmp_path: Path, m
         cut = sanity_slice(frame(system), system.contract.node("radiationSensor"))
         outcomes = discharge_sanity(cut, few, Limits(seconds=30)).outcomes
     else:
-        planned = planned_method(work)
-        job, tool = method_job(system, system.contract.node("agent"), planned), backend(method)
+        assert work.planned is not None
+        tool, job = work.planned
         assert not tool.uses_steps
         assert tool.check(job) is not None
         tool.export(job)
@@ -323,7 +322,8 @@ def test_a_plug_in_is_taken_to_look_at_the_steps(tmp_path: Path) -> None:
 
     def key(tool: Backend, of: System) -> str:
         work = catalogue(system).work("agent", "hypothesis")
-        return surroundings(tool, method_job(of, of.contract.node("agent"), planned_method(work)), "")
+        assert work.planned is not None
+        return surroundings(tool, replace(work.planned[1], system=of), "")
 
     assert key(Tool(), system) != key(Tool(), other)
     assert key(Short(), system) == key(Short(), other)
