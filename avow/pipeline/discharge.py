@@ -22,7 +22,7 @@ from avow.evidence.ledger import Entry, ledger_of
 from avow.evidence.obligation import Obligation
 from avow.evidence.record import CASE, ISOLATION, OBSERVED, RETRY, Evidence
 from avow.pipeline import dispatch
-from avow.pipeline.export import folder, generated
+from avow.pipeline.export import folder
 from avow.pipeline.recheck import still_counts
 from avow.pipeline.run_info import Run
 from avow.pipeline.state import State
@@ -68,8 +68,7 @@ def prepare(state: State) -> None:
     works = [w for s in state.surveyed for w in s.catalogue.works if w.engine != LANGUAGE]
     with contextlib.suppress(OSError):  # the stage reports it
         if any(open_obligations(state.workspace, work, state.run) for work in works):
-            methods = {work.name: work for work in works if not work.is_engine}
-            state.run.processes.prepare(state.workspace.root, lambda name: generated(methods[name]))
+            state.run.processes.prepare(state.workspace.root)
 
 
 def discharge(workspace: Workspace, work: Work, run: Run) -> tuple[Outcome, ...]:

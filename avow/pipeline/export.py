@@ -21,7 +21,6 @@ from avow.base.workspace import Workspace
 from avow.language.contract import Node
 from avow.pipeline.blobs import encode
 from avow.pipeline.methods import method_job
-from avow.pipeline.processes import Processes
 from avow.pipeline.slices import MethodSlice, whole_node
 from avow.pipeline.work import Work
 
@@ -105,11 +104,9 @@ def generated(work: Work) -> Mapping[str, str]:
     return one_step.export(work.planned[0], job)
 
 
-def export(workspace: Workspace, work: Work, key: str, processes: Processes | None = None) -> tuple[str, ...]:
+def export(workspace: Workspace, work: Work, key: str) -> tuple[str, ...]:
     """Write what the backend generates, remove what it generated only before, and return the files' names."""
-    files = processes.generated(work.name) if processes is not None else None
-    if files is None:
-        files = generated(work)
+    files = generated(work)
     place = folder(workspace, work)
     for name in files:
         _inside(name, work)

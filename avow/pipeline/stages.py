@@ -146,7 +146,7 @@ def _system(state: State, surveyed: Survey) -> Iterator[Task]:
                 yield {
                     "basename": "export",
                     "name": title,
-                    "actions": [partial(_act, partial(exporting.export, workspace, work, key, state.run.processes))],
+                    "actions": [partial(_act, partial(exporting.export, workspace, work, key))],
                     "task_dep": [check],
                     "uptodate": [partial(exporting.is_current, workspace, work, key)],
                     "clean": [partial(exporting.clean, workspace, work)],

@@ -73,10 +73,6 @@ class Work:
         return bool(self.texts) and self.texts != texts_digest(self.system)
 
     @property
-    def name(self) -> str:
-        return f"{self.system.name}:{self.node}:{self.method}"
-
-    @property
     def is_engine(self) -> bool:
         return self.planned is None
 

@@ -78,7 +78,7 @@ def keys(folder: Path, *names: str) -> Keys:
     assert isinstance(found, Survey), found
     works = [work for work in found.catalogue.works if work.engine in names]
     assert {work.engine for work in works if work.keys} == {*names}
-    return {(work.name, claim): key for work in works for claim, key in work.keys.items()}
+    return {(work.node, work.method, claim): key for work in works for claim, key in work.keys.items()}
 
 
 # -- what is an input by what it is --------------------------------------------------------------------------------

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import signal
 import subprocess
@@ -156,7 +155,7 @@ def test_an_interrupt_ends_all_works(odd: Path, way: str) -> None:
 
 
 _RUN = """
-import json, os, sys, threading
+import sys, threading
 from pathlib import Path
 from avow.backend_kit.registry import trust_plugins
 from avow.base.workspace import Workspace
@@ -171,23 +170,14 @@ def settle(does):
     work = survey(root / "contracts" / does).work("odd")
     print(dispatch.settle(Workspace(root), work, work.obligations, root, run).outcomes[0].verdict, flush=True)
 
-def generate(name):
-    if name == "end":
-        os.abort()
-    return {"pid": str(os.getpid()), "name": name, "odd": "\\udc80\\n"} if name != "wrong" else 1 / 0
-
-print(json.dumps(run.processes.generated("early")))
-run.processes.prepare(root, generate)
-for name in sys.argv[2:]:
-    if name.startswith("settle:"):
-        threading.Thread(target=settle, args=(name[7:],)).start()
-    else:
-        print(json.dumps(run.processes.generated(name)), flush=True)
+run.processes.prepare(root)
+for does in sys.argv[2:]:
+    threading.Thread(target=settle, args=(does,)).start()
 """
 
 
 def _run(root: Path, *words: str) -> subprocess.Popen[str]:
-    """A process with one thread, which settles a system for ``settle:SYSTEM`` and generates files for other words."""
+    """A process with one thread, which settles these systems at once."""
     return subprocess.Popen(
         [sys.executable, "-P", "-c", _RUN, str(root), *words], cwd="/", text=True, stdout=-1, stderr=-1
     )
@@ -195,10 +185,10 @@ def _run(root: Path, *words: str) -> subprocess.Popen[str]:
 
 def test_jobs_at_once_do_not_wait_for_each_other(odd: Path) -> None:
     (odd / "pids").unlink(missing_ok=True)
-    with _run(odd, "settle:hangs") as first:
+    with _run(odd, "hangs") as first:
         started = pids(odd)
-        with _run(odd, *["settle:answers"] * 3) as run:
-            assert run.communicate()[0].split() == ["null", *["tested"] * 3]
+        with _run(odd, *["answers"] * 3) as run:
+            assert run.communicate()[0].split() == ["tested"] * 3
         assert all(map(alive, started))
         first.kill()
     wait_for(lambda: not any(map(alive, started)))
@@ -208,7 +198,7 @@ def test_jobs_at_once_do_not_wait_for_each_other(odd: Path) -> None:
 @pytest.mark.parametrize("whose", ["the run", "the job's process"])
 def test_nothing_outlives_what_is_killed(odd: Path, way: str, whose: str) -> None:
     (odd / "pids").unlink(missing_ok=True)
-    with _run(odd, "settle:hangs", "more") as run:
+    with _run(odd, "hangs") as run:
         started = pids(odd)
         family = process._descendants(run.pid)
         assert set(started) <= set(family)
@@ -216,14 +206,3 @@ def test_nothing_outlives_what_is_killed(odd: Path, way: str, whose: str) -> Non
         said, _ = run.communicate(timeout=120)
     wait_for(lambda: not any(map(alive, family)))
     assert ("error" in said) == (whose != "the run")
-
-
-def test_the_generator_answers_what_the_run_would_and_else_nothing(odd: Path) -> None:
-    with _run(odd, "one", "wrong", "two\n", "end", "late") as run:
-        early, one, wrong, two, ended, late = map(json.loads, run.communicate()[0].splitlines())
-    assert early is None
-    assert one["odd"] == "\udc80\n"
-    assert int(one["pid"]) != run.pid
-    assert wrong is None, "the run generates it itself, and reports what is wrong"
-    assert (two["name"], two["pid"]) == ("two\n", one["pid"])
-    assert (ended, late) == (None, None)

@@ -99,7 +99,7 @@ def test_a_slice_comes_back_as_it_was_sent_and_gives_the_same_keys(folder: Path)
         assert work.cut is not None
         sent = encode(work.cut(), folder)
         assert encode(decode(sent, folder), folder) == sent
-        assert keys_of(decode(sent, folder)) == work.keys, work.name
+        assert keys_of(decode(sent, folder)) == work.keys, work.method
         assert str(folder).encode() not in sent
         assert b"system.rcl" not in sent
 
@@ -114,7 +114,7 @@ def test_what_is_sent_of_a_shipped_system_gives_the_same_keys(system: Path) -> N
     place = system.absolute()
     for work in works(place):
         assert work.cut is not None
-        assert keys_of(decode(encode(work.cut(), place), place)) == work.keys, work.name
+        assert keys_of(decode(encode(work.cut(), place), place)) == work.keys, work.method
 
 
 _SHOWN = {
