@@ -7,9 +7,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import assert_never
 
-from avow.base.diagnostics import Diagnostic, Span
+from avow.base.diagnostics import Diagnostic
 from avow.language.contract import Clause, Definition, Node, Port
 from avow.language.definitions import show_clause
 from avow.language.lexer import Token
@@ -18,10 +17,9 @@ from avow.language.printer import show_sort, show_term, show_type
 from avow.language.scope import of_contract
 from avow.language.source import Source
 from avow.language.subterms import subterms
-from avow.language.syntax import ConstantDeclaration, Declaration, Define, TypeDeclaration
 from avow.language.terms import Quantified, Variable
 from avow.lsp.background import Answer
-from avow.lsp.names import CLAUSES, Meaning, Occurrence, Text, What, at_offset, clause_names, taken_apart
+from avow.lsp.names import CLAUSES, Meaning, Occurrence, Text, What, at_offset, taken_apart
 from avow.lsp.project import Project, about_plan, is_plan, project_of
 from avow.lsp.renaming import all_occurrences
 from avow.lsp.vocabulary import BUILTIN_TYPES, FORMS
@@ -30,18 +28,6 @@ StatusLookup = Callable[[str, str], str | None]
 """(node, clause) → its status in the ledger, in a few words; None if it has none."""
 SanityLookup = Callable[[Node, str | None], tuple[Answer, ...]]
 """The known answers about the sanity of a node's clause, or (None) of the node and its outputs."""
-
-
-@dataclass(frozen=True, slots=True)
-class Symbol:
-    """An entry of the editor's outline."""
-
-    name: str
-    detail: str
-    kind: str
-    """node, type, constant, definition, assumption or guarantee"""
-    span: Span
-    inner: tuple[Symbol, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,35 +119,6 @@ def references(document: Document, offset: int, declarations: bool = True) -> tu
         return ()
     found = (o for o in document.names if o.written and o.meaning == name.meaning)
     return tuple(o for o in found if declarations or not o.declares)
-
-
-def symbols(document: Document) -> tuple[Symbol, ...]:
-    """The outline: the context's declarations, the nodes, and their clauses."""
-    source, syntax = Source(document.file, document.text), document.taken_apart.syntax
-    found = [
-        Symbol(tree.name.text, kind, kind, source.span(tree.start, tree.end))
-        for tree in syntax.declarations
-        for kind in (_kind(tree),)
-    ]
-    for node in syntax.nodes:
-        inner = [Symbol(d.name.text, "definition", "definition", source.span(d.start, d.end)) for d in node.definitions]
-        for clause, (meaning, _, _, _) in zip(node.clauses, clause_names(node), strict=True):
-            detail = clause.sentence.text.strip('"') if clause.sentence else ""
-            inner.append(Symbol(meaning.name, detail, str(clause.kind), source.span(clause.start, clause.end)))
-        found.append(Symbol(node.name.text, "node", "node", source.span(node.start, node.end), tuple(inner)))
-    return tuple(found)
-
-
-def _kind(tree: Declaration) -> str:
-    match tree:
-        case TypeDeclaration():
-            return "type"
-        case ConstantDeclaration():
-            return "constant"
-        case Define():
-            return "definition"
-        case _:
-            assert_never(tree)
 
 
 # --- finding out -----------------------------------------------------------------------------------------------------

@@ -9,25 +9,26 @@ from typing import Any
 from lsprotocol import types
 
 from avow.base.diagnostics import Diagnostic, Severity, Span
+from avow.language.contract import ClauseKind
 from avow.language.source import Source
+from avow.language.syntax import ConstantDeclaration, Declaration, Define, TypeDeclaration
 from avow.lsp.appearance import MODIFIERS, TOKEN_TYPES, Coloured
 from avow.lsp.background import Answer
 from avow.lsp.completion import Offer, Signature
-from avow.lsp.features import Document, Symbol
+from avow.lsp.features import Document
+from avow.lsp.names import clause_names
 
 SEVERITIES = {
     Severity.ERROR: types.DiagnosticSeverity.Error,
     Severity.WARNING: types.DiagnosticSeverity.Warning,
     Severity.NOTE: types.DiagnosticSeverity.Information,
 }
-_SYMBOLS = {
-    "node": types.SymbolKind.Class,
-    "type": types.SymbolKind.Struct,
-    "constant": types.SymbolKind.Constant,
-    "definition": types.SymbolKind.Function,
-    "assumption": types.SymbolKind.Event,
-    "guarantee": types.SymbolKind.Function,
+_DECLARED = {
+    TypeDeclaration: ("type", types.SymbolKind.Struct),
+    ConstantDeclaration: ("constant", types.SymbolKind.Constant),
+    Define: ("definition", types.SymbolKind.Function),
 }
+_CLAUSES = {ClauseKind.ASSUMPTION: types.SymbolKind.Event, ClauseKind.GUARANTEE: types.SymbolKind.Function}
 _OFFERS = {
     "keyword": types.CompletionItemKind.Keyword,
     "operator": types.CompletionItemKind.Operator,
@@ -119,16 +120,30 @@ def refuted(answer: Answer, place: types.Range) -> types.Diagnostic:
     return types.Diagnostic(place, "\n".join(said), severity=severity, code=answer.name, source="avow sanity")
 
 
-def symbol(found: Symbol, lines: Lines) -> types.DocumentSymbol:
-    place = lines.of_span(found.span)
-    return types.DocumentSymbol(
-        name=found.name or "(no name)",
-        kind=_SYMBOLS[found.kind],
-        range=place,
-        selection_range=place,
-        detail=found.detail,
-        children=[symbol(s, lines) for s in found.inner],
-    )
+def outline(document: Document, lines: Lines) -> list[types.DocumentSymbol]:
+    """The context's declarations, the nodes, and their definitions and clauses."""
+
+    def declared(tree: Declaration) -> types.DocumentSymbol:
+        kind, symbol = _DECLARED[type(tree)]
+        return _symbol(tree.name.text, symbol, lines.range(tree.start, tree.end), kind)
+
+    syntax = document.taken_apart.syntax
+    found = [declared(tree) for tree in syntax.declarations]
+    for node in syntax.nodes:
+        inner = [declared(definition) for definition in node.definitions]
+        for clause, (meaning, _, _, _) in zip(node.clauses, clause_names(node), strict=True):
+            sentence = clause.sentence.text.strip('"') if clause.sentence else ""
+            place = lines.range(clause.start, clause.end)
+            inner.append(_symbol(meaning.name, _CLAUSES[clause.kind], place, sentence))
+        place = lines.range(node.start, node.end)
+        found.append(_symbol(node.name.text, types.SymbolKind.Class, place, "node", inner))
+    return found
+
+
+def _symbol(
+    name: str, kind: types.SymbolKind, place: types.Range, detail: str, inner: Sequence[types.DocumentSymbol] = ()
+) -> types.DocumentSymbol:
+    return types.DocumentSymbol(name or "(no name)", kind, place, place, detail, children=list(inner))
 
 
 def completion_item(offer: Offer, number: int, snippets: bool) -> types.CompletionItem:

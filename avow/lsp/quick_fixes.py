@@ -20,6 +20,9 @@ from avow.language.source import Source
 _QUOTED = re.compile(r"`` ?([^`]+) ?``|`([^`\n]+)`|\bwrite '([^'\n]+)'")
 _WORD = re.compile(r"[A-Za-z_][A-Za-z0-9_']*")
 
+_MOST = 3
+"""Fixes of one message."""
+
 Check = Callable[[str], tuple[Diagnostic, ...]]
 """A text → its diagnostics."""
 
@@ -34,7 +37,7 @@ class Fix:
     text: str
 
 
-def fixes(diagnostic: Diagnostic, text: str, check: Check, most: int = 3) -> tuple[Fix, ...]:
+def fixes(diagnostic: Diagnostic, text: str, check: Check) -> tuple[Fix, ...]:
     """The fixes of one message about a text; none if its hint proposes nothing that helps."""
     if diagnostic.span is None or not diagnostic.hint:
         return ()
@@ -45,7 +48,7 @@ def fixes(diagnostic: Diagnostic, text: str, check: Check, most: int = 3) -> tup
     for fix in islice(_candidates(diagnostic, text, start, end), FIXES_TRIED):
         if fix.title not in good and _helps(fix, diagnostic, text, before, check):
             good[fix.title] = fix
-        if len(good) == most:
+        if len(good) == _MOST:
             break
     return tuple(good.values())
 

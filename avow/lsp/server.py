@@ -279,7 +279,7 @@ class Server:
         return found
 
     def outline(self, document: Document, lines: Lines, _: types.DocumentSymbolParams) -> list[types.DocumentSymbol]:
-        return [protocol.symbol(s, lines) for s in features.symbols(document)]
+        return protocol.outline(document, lines)
 
     def folding(self, document: Document, lines: Lines, _: types.FoldingRangeParams) -> list[types.FoldingRange]:
         places = (lines.range(*place) for place in folds(document.taken_apart))

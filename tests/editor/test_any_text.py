@@ -13,10 +13,10 @@ from editor.test_client import CONTRACT, PLAN
 
 from avow.lsp.appearance import MODIFIERS, TOKEN_TYPES, coloured, folds
 from avow.lsp.completion import offers, signature
-from avow.lsp.features import Document, analyse, definition, hover, name_at, references, symbols
+from avow.lsp.features import Document, analyse, definition, hover, name_at, references
 from avow.lsp.plan_keys import about_key, plan_offers
 from avow.lsp.plan_names import PlanText, plan_occurrences
-from avow.lsp.protocol import Lines, semantic_tokens, signature_help
+from avow.lsp.protocol import Lines, outline, semantic_tokens, signature_help
 from avow.lsp.renaming import renamed_with
 
 PIECES = (
@@ -77,7 +77,7 @@ def check(document: Document, places: range) -> None:
     assert all(c.kind in TOKEN_TYPES and set(c.modifiers) <= set(MODIFIERS) for c in colours)
     assert all(number >= 0 for number in semantic_tokens(colours, lines).data)
     assert all(0 <= start < end <= len(document.text) for start, end in folds(part))
-    symbols(document)
+    outline(document, lines)
     for one in document.names:
         assert not one.written or document.text[one.start : one.end] == one.meaning.name
     for offset in places:

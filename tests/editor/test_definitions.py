@@ -8,8 +8,9 @@ pytest.importorskip("pygls")
 
 from avow.lsp.appearance import coloured
 from avow.lsp.completion import offers, signature
-from avow.lsp.features import analyse, definition, hover, references, symbols
+from avow.lsp.features import analyse, definition, hover, references
 from avow.lsp.plan_keys import about_key, plan_offers
+from avow.lsp.protocol import Lines, outline
 
 TEXT = """\
 context { define far(r : REAL) = r > 9; }
@@ -18,7 +19,7 @@ node n {
   outputs( y : BOOL )
   topics()
   define beyond(a, b : REAL) = far(a) and b < in.x;
-  guarantee g ( beyond(1, 2) -> y )
+  guarantee g "It *is* far" ( beyond(1, 2) -> y )
 }
 """
 
@@ -31,8 +32,9 @@ def test_it_knows_them() -> None:
     assert hover(document, TEXT.index("far(a)")) == "`define far(r : REAL) = r > 9`"
     assert [TEXT[o.start - 7 : o.end] for o in definition(document, use)] == ["define beyond"]
     assert [o.start for o in references(document, use)] == [TEXT.index("beyond"), use]
-    assert [s.name for s in symbols(document)] == ["far", "n"]
-    assert [(s.name, s.kind) for s in symbols(document)[1].inner] == [("beyond", "definition"), ("g", "guarantee")]
+    far, node = outline(document, Lines(document.text))
+    assert [far.name, node.name] == ["far", "n"]
+    assert [(s.name, s.detail) for s in node.children or ()] == [("beyond", "definition"), ("g", "It *is* far")]
     kinds = {TEXT[c.start : c.end]: c.kind for c in coloured(document.taken_apart, document.names)}
     assert [kinds[word] for word in ("define", "beyond", "far", "a", "x")] == [
         *("keyword", "function", "function", "parameter", "property")
@@ -46,7 +48,7 @@ def test_it_completes_them() -> None:
         at = TEXT.index(before) + len(before)
         return {o.label: o.kind for o in offers(document.taken_apart, document.project.contract, at)}
 
-    in_clause = offered("guarantee g ( ")
+    in_clause = offered('far" ( ')
     assert (in_clause["beyond"], in_clause["far"]) == ("definition", "definition")
     in_body = offered("define beyond(a, b : REAL) = ")
     assert (in_body["far"], in_body["a"], in_body["in.x"]) == ("definition", "variable", "input")

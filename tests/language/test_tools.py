@@ -232,7 +232,7 @@ def at(text: str, needle: str, plus: int = 0) -> int:
 
 
 def test_answers() -> None:
-    from avow.lsp.features import analyse, definition, hover, symbols
+    from avow.lsp.features import analyse, definition, hover
 
     document = analyse(TEXT, "f")
     said = hover(document, at(TEXT, "stat == red"))
@@ -255,9 +255,6 @@ def test_answers() -> None:
     ):
         (found,) = definition(document, at(TEXT, needle, plus))
         assert Source("f", TEXT).place(found.start) == place
-    outline = symbols(document)
-    assert [(s.name, s.kind) for s in outline] == [("Stat", "type"), ("Limit", "constant"), ("n", "node")]
-    assert [(s.name, s.detail) for s in outline[2].inner] == [("fine", "It is *fine*")]
 
 
 def test_standing_of_a_guarantee(workspace: Path) -> None:
