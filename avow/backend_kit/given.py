@@ -4,13 +4,16 @@ reading messages."""
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from avow.backend_kit.protocol import Job
+from avow.backend_kit.protocol import COMMON_OPTIONS, Job
 from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.base.files import inside, read_regular
+from avow.base.remembered import Shelf
 from avow.base.suggestions import suggest
+from avow.system.plan import Located
 
 
 def schema(properties: Mapping[str, Any], *required: str, **more: Any) -> dict[str, Any]:
@@ -121,6 +124,17 @@ def job_for(folder: Path, node: str, backend: str, method: str | None, *, wrong:
         message = f"the plan has {what} among the methods of node '{node}'"
         raise Rejected(Diagnostic(wrong, message, hint="say which one: --method ID" if found else hint))
     return Job(system, system.contract.node(node), found[0], ())
+
+
+def misshapen(
+    schema: Mapping[str, Any], options: Located, whole: str, shelf: Shelf | None = None
+) -> tuple[Diagnostic, ...]:
+    """Every violation of a backend's schema in a method's options, without those for any backend."""
+    from avow.system.schema import violations  # likewise
+
+    if isinstance(options.data, Mapping):
+        options = replace(options, data={k: v for k, v in options.data.items() if k not in COMMON_OPTIONS})
+    return violations(options, schema, whole, shelf)
 
 
 # -- the reading of messages--------------------------------------------------------------------------------------------

@@ -195,7 +195,8 @@ class Names(ABC):
             return
         other = Role.OUTPUT if role is Role.INPUT else Role.INPUT
         environment = scope.environment
-        hint = did_you_mean(name, scope.ports(role))
+        longer = [f"`{role}.{port}`" for port in scope.ports(role) if port.startswith(f"{name}_")]  # for `name.field`
+        hint = f"did you mean {' or '.join(longer[:8])}?" if longer else did_you_mean(name, scope.ports(role))
         if name in scope.ports(other):
             hint = f"it is an {other}put: write `{other}.{name}`"
         elif environment.sort(name) is not None or name in environment.constants or name in environment.elements:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from avow.language.foreign import OPERATORS
-from avow.language.lexer import KEYWORDS, SYMBOLS, Token
+from avow.language.lexer import KEYWORDS, LIMITED, SYMBOLS, Token
 from avow.language.source import Reports
 
 _WORDS = {
@@ -119,7 +119,10 @@ def _in_formula(
     earlier: Sequence[Token], before: Token | None, found: Token, after: Token | None, expected: frozenset[str]
 ) -> str | None:
     """The hint for a token in a formula, from the most to the least specific."""
-    if before is not None and before.end < found.start and before.text + found.text in SYMBOLS:
+    if before is not None and before.text in LIMITED and found.type == "NUMBER" and "NUMBER" not in expected:
+        unit = after.text if after is not None and after.text.isalpha() else "steps"
+        return f"write its limit in brackets: `{before.text}[{found.text} {unit}](F)`"
+    if before is not None and before.end < found.start and found.text and before.text + found.text in SYMBOLS:
         return f"write `{before.text}{found.text}` without a space in it"
     if expected == {"DOT"} and before is not None:
         return f"`{before.text}` is a keyword; write `{before.text}.v` for the {before.text}put `v`"

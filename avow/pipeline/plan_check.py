@@ -9,6 +9,7 @@ from typing import Any
 
 from avow.assurance.policy import read_policy
 from avow.backend_kit import one_step
+from avow.backend_kit.given import misshapen
 from avow.backend_kit.protocol import COMMON_OPTIONS, asking
 from avow.base.diagnostics import Diagnostic, Rejected, Severity, Span
 from avow.base.remembered import Shelf
@@ -22,7 +23,6 @@ from avow.system.graph import dataflow
 from avow.system.node_plan import never_read
 from avow.system.plan import Located, Method, System
 from avow.system.rosgraph import account
-from avow.system.schema import violations
 from avow.system.statements import not_validated, requirement_sentences, without_words
 from avow.system.topics import heard, turned, unknown_types
 
@@ -144,36 +144,37 @@ def _method(
         return
     whole = f"nodes.{node}: {method.id}"
     with asking(tool.name, "options_schema"):
-        wrong = tuple(_schema(tool.options_schema, method.options, whole, shelf))
+        wrong = tuple(misshapen(tool.options_schema, method.options, whole, shelf))
     yield from wrong
+    without: tuple[Span, ...] = ()
     if any(d.is_error for d in wrong):
-        method = replace(method, options=_right(tool.options_schema, method.options))
-        if any(_schema(tool.options_schema, method.options, whole)):
+        options, without = _right(tool.options_schema, method.options)
+        method = replace(method, options=options)
+        if any(misshapen(tool.options_schema, options, whole)):
             return  # without the faulty options the others mean nothing
     if node in [n.name for n in system.contract.nodes]:
         job = method_job(system, system.contract.node(node), method)
-        yield from (d for d in one_step.check(tool, job) if not follows(d))
+        yield from (d for d in one_step.check(tool, job) if not (follows(d) or d.span in without))
 
 
-def _right(schema: Mapping[str, Any], options: Located) -> Located:
-    """The options that are correct by themselves."""
-    known = schema.get("properties", {})
+def _right(schema: Mapping[str, Any], options: Located) -> tuple[Located, tuple[Span, ...]]:
+    """The options, and the entries of options, that are correct by themselves; and the places of the others."""
     if not isinstance(options.data, Mapping):
-        return options
-    alone = {key: Located({key: value}, options.span) for key, value in options.data.items()}
-    right = {
-        key: options.data[key]
-        for key, one in alone.items()
-        if key in COMMON_OPTIONS or (key in known and not any(_schema({"properties": known}, one, "")))
-    }
-    return replace(options, data=right)
+        return options, ()
+    properties = {"properties": schema.get("properties", {})}
 
+    def fine(key: str, value: Any) -> bool:
+        one = Located({key: value}, options.span)
+        return key in COMMON_OPTIONS or (key in properties["properties"] and not any(misshapen(properties, one, "")))
 
-def _schema(
-    schema: Mapping[str, Any], options: Located, whole: str, shelf: Shelf | None = None
-) -> Iterable[Diagnostic]:
-    data = options.data
-    if isinstance(data, Mapping):
-        own = {k: v for k, v in data.items() if k not in COMMON_OPTIONS}
-        options = Located(own, options.span, options.spans)
-    yield from violations(options, schema, whole, shelf)
+    right: dict[str, Any] = {}
+    without: list[Span] = []
+    for key, value in options.data.items():
+        parts = {part: {part: inner} for part, inner in value.items()} if isinstance(value, Mapping) else {}
+        kept = [part for part in parts.values() if fine(key, part)]
+        if fine(key, value):
+            right[key] = value
+        elif kept:
+            right[key] = {name: inner for part in kept for name, inner in part.items()}
+            without += [options.at(key, name) for name, part in parts.items() if part not in kept]
+    return replace(options, data=right), tuple(without)

@@ -16,6 +16,7 @@ from avow.base.diagnostics import Diagnostic, Severity, Span
 from avow.base.graphs import components, cycles_in, reached
 from avow.base.records import dataclass
 from avow.base.remembered import by_identity
+from avow.base.suggestions import nearest
 from avow.language.contract import Node, Port
 from avow.language.sorts import INTEGER, NATURAL, Sort
 from avow.system.plan import Edge, Endpoint, System
@@ -208,7 +209,7 @@ def _by_topics(nodes: Sequence[Node], taken: Collection[Endpoint], found: Ends, 
             elif chosen:
                 faults.append(_several(target, [at.node for at, _ in chosen], port))
             elif others:
-                faults.append(_which(target, others, carrier))
+                faults.append(_which(target, others, carrier, found))
     return edges
 
 
@@ -223,10 +224,14 @@ def _other_type(at: Endpoint, output: Port, target: Endpoint, port: Port, carrie
     return Diagnostic("PLAN121", message, carrier.span, hint="give both ports one type, or remap one of them")
 
 
-def _which(target: Endpoint, others: Sequence[tuple[Endpoint, Port]], carrier: Carrier) -> Diagnostic:
+def _which(target: Endpoint, others: Sequence[tuple[Endpoint, Port]], carrier: Carrier, found: Ends) -> Diagnostic:
+    """Outputs of other names on an input's topic; the one of its name may be on a topic with a similar name."""
     known = ", ".join(str(at) for at, _ in others)
     message = f"{carrier.topic} carries {known}, and which of them is {target} is not said"
     hint = f"connections: {{from: {others[0][0]}, to: {target}}}"
+    alike = {c.topic: at for at, carriers in found.outputs.items() if at.port == target.port for c in carriers}
+    for near in nearest(carrier.topic, alike):
+        hint = f"{alike[near]} is published on `{near}`: did you mean `{carrier.topic}`?"
     return Diagnostic("ROS115", message, carrier.span, hint=hint)
 
 
@@ -274,9 +279,7 @@ def _by_names(
                 )
                 faults.append(Diagnostic("PLAN121", message, port.span, Severity.WARNING))
             elif carrier is None or Endpoint(node.name, port.name) not in found.outputs:
-                message = (
-                    f"{node.name} has an input and an output {port.name!r}; a node feeds itself only by a connection"
-                )
+                message = f"{node.name} has an input and an output {port.name!r}; only a connection links them"
                 hint = f"connections: {{from: {target}, to: {target}, delayed: true, initial: …}}"
                 faults.append(Diagnostic("PLAN124", message, port.span, Severity.WARNING, hint))
     return edges

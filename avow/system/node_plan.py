@@ -162,9 +162,7 @@ def check_memory(plan: Plan, nodes: dict[str, Node]) -> Iterator[Diagnostic]:
         for port in entry.source.memory:
             where, span = f"nodes.{entry.node}.memory", entry.source.place.at("memory", port)
             if port not in inputs:
-                message = (
-                    f"{where}: {port!r} is no input of {entry.node}; memory is what a step reads of the step before"
-                )
+                message = f"{where}: {port!r} is no input of {entry.node}; memory is what a step reads of the last one"
                 yield Diagnostic("PLAN106", message, span, hint=suggest(port, inputs))
                 continue
             if not isinstance(inputs[port].sort, HELD):

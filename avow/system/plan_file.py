@@ -356,9 +356,7 @@ class _PlanReader:
             self.faults += wrong_words(key, piece)
             matched = piece.at("matched")
             if matched is not None and not is_wild(texts["obligation"]):
-                message = (
-                    f"{key}: {texts['obligation']!r} has no * or ? in it: it matches what it names, and nothing else"
-                )
+                message = f"{key}: {texts['obligation']!r} has no * or ? in it: it matches only what it names"
                 self.fault("PLAN110", message, matched.span, hint="leave  matched  out")
             found = piece.at("found")
             if found is not None and is_wild(texts["obligation"]):

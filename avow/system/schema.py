@@ -9,7 +9,7 @@ from dataclasses import replace
 from functools import cache
 from typing import Any
 
-from avow.base.diagnostics import Diagnostic
+from avow.base.diagnostics import Diagnostic, Span
 from avow.base.packaged import packaged
 from avow.base.remembered import Shelf
 from avow.base.suggestions import suggest
@@ -141,37 +141,39 @@ def _pattern(validator: Any, pattern: str, instance: Any, schema: Any) -> Iterat
         yield ValidationError(f"{instance!r} does not match {pattern!r}")
 
 
-def _explain(error: Any, root: Piece, whole: str) -> Iterator[Diagnostic]:
+def _explain(error: Any, root: Piece, whole: str, also: Iterable[Any] = ()) -> Iterator[Diagnostic]:
+    """`also`: the errors of other alternatives about the same value, which allow other words."""
     path: tuple[str | int, ...] = tuple(error.absolute_path)
     piece = root.at(*path) or root
     where = _key_path(path, whole)
     about = error.schema.get("description") if isinstance(error.schema, dict) else None
     wanted = f" (expected: {about})" if about else ""
+    given = _show(error.instance)
+
+    def fault(text: str, code: str = "PLAN105", at: Span | None = None, hint: str | None = None) -> Diagnostic:
+        return Diagnostic(code, f"{where}: {text}", at or piece.span, hint=hint)
+
     if "propertyNames" in error.absolute_schema_path:
         name = str(error.instance)
-        yield Diagnostic("PLAN103", f"{where}: the key {name!r} cannot be used here{wanted}", piece.key_span(name))
+        yield fault(f"the key {name!r} cannot be used here{wanted}", "PLAN103", piece.key_span(name))
         return
     match error.validator:
         case "additionalProperties":
             known = list(error.schema.get("properties", {}))
-            for key in piece.entries or {}:
-                if key not in known:
-                    yield Diagnostic(
-                        "PLAN103", f"{where}: unknown key {key!r}", piece.key_span(key), hint=suggest(key, known)
-                    )
+            for key in (key for key in piece.entries or {} if key not in known):
+                yield fault(f"unknown key {key!r}", "PLAN103", piece.key_span(key), suggest(key, known))
         case "required":
             missing = [key for key in error.validator_value if key not in (piece.entries or {})]
             named = str(error.message).split("'")[1] if "'" in str(error.message) else ""
             if named in missing:
-                yield Diagnostic("PLAN104", f"{where}: the key {named!r} is missing", piece.span)
-        case "enum":
-            allowed = [str(value) for value in error.validator_value]
-            yield Diagnostic(
-                "PLAN105",
-                f"{where}: {_show(error.instance)} is not one of {', '.join(allowed)}",
-                piece.span,
-                hint=suggest(str(error.instance), allowed) if isinstance(error.instance, str) else None,
-            )
+                yield fault(f"the key {named!r} is missing", "PLAN104")
+        case "enum" | "const":
+            allowed = [json.dumps(word).strip('"') for one in (error, *also) for word in _words(one)]
+            if len(allowed) == 1:
+                yield fault(f"{allowed[0]} is wanted, not {given}{wanted}", hint=f"write `{allowed[0]}`")
+                return
+            hint = suggest(error.instance, allowed) if isinstance(error.instance, str) else None
+            yield fault(f"{given} is not one of {', '.join(allowed)}", hint=hint)
         case "type":
             kinds = error.validator_value if isinstance(error.validator_value, list) else [error.validator_value]
             names = " or ".join(str(_KINDS.get(kind, kind)) for kind in kinds)
@@ -181,54 +183,69 @@ def _explain(error: Any, root: Piece, whole: str) -> Iterator[Diagnostic]:
             elif isinstance(error.instance, int | float | bool) and "string" in kinds and "pattern" not in error.schema:
                 hint = "put it in quotes"
             if "pattern" in error.schema and about:
-                message = f"{where}: {about} is wanted, not {_show(error.instance)}"
-                yield Diagnostic("PLAN105", message, piece.span)
+                yield fault(f"{about} is wanted, not {given}")
                 return
-            yield Diagnostic(
-                "PLAN105", f"{where}: {names} is wanted, not {_show(error.instance)}{wanted}", piece.span, hint=hint
-            )
+            yield fault(f"{names} is wanted, not {given}{wanted}", hint=hint)
         case "pattern":
-            yield Diagnostic("PLAN105", f"{where}: {_show(error.instance)} has not the right form{wanted}", piece.span)
+            yield fault(f"{given} has not the right form{wanted}")
         case "minLength" | "minItems" | "minProperties":
-            yield Diagnostic("PLAN105", f"{where}: must not be empty{wanted}", piece.span)
+            yield fault(f"must not be empty{wanted}")
         case "oneOf" | "anyOf":
             ways = _alternatives(error.validator_value)
             fitting = [e for e in error.context if not _another_kind(e, error)]
-            fitting = _nearest(fitting, error)
+            fitting = _narrowed(fitting, error, "additionalProperties")
+            closed = _closed(fitting, error)
+            fitting = _narrowed(_narrowed(fitting, error, "const"), error, "required")
+            several = len({_way(e, error) for e in fitting}) > 1
             if not error.context:
-                yield Diagnostic("PLAN105", f"{where}: either {ways} is wanted, not both{wanted}", piece.span)
+                yield fault(f"either {ways} is wanted, not both{wanted}")
             elif not fitting:
-                message = f"{where}: {ways} is wanted, not {_show(error.instance)}{wanted}"
-                yield Diagnostic("PLAN105", message, piece.span)
-            elif all(e.validator == "required" and e.absolute_path == error.absolute_path for e in fitting):
-                yield Diagnostic("PLAN104", f"{where}: {ways} is missing{wanted}", piece.span)
+                yield fault(f"{ways} is wanted, not {given}{wanted}")
+            elif closed:
+                yield from _explain(closed[0], root, whole, closed[1:])
+            elif several and all(e.validator == "required" and e.absolute_path == error.absolute_path for e in fitting):
+                ways = _alternatives({"required": e.validator_value} for e in fitting)
+                yield fault(f"{ways} is missing{wanted}", "PLAN104")
             else:
                 for inner in fitting:
                     yield from _explain(inner, root, whole)
         case "maxProperties":
-            yield Diagnostic("PLAN105", f"{where}: exactly one key is wanted{wanted}", piece.span)
+            yield fault(f"exactly one key is wanted{wanted}")
         case _:  # in the validator's words
-            yield Diagnostic("PLAN105", f"{where}: {str(error.message)[:300]}{wanted}", piece.span)
+            yield fault(f"{str(error.message)[:300]}{wanted}")
+
+
+def _words(error: Any) -> list[Any]:
+    """The values that an error's schema allows."""
+    return [error.validator_value] if error.validator == "const" else error.validator_value
+
+
+def _way(inner: Any, outer: Any) -> Any:
+    """The alternative of an outer error that an inner one is about."""
+    return list(inner.absolute_schema_path)[len(list(outer.absolute_schema_path))]
 
 
 def _another_kind(inner: Any, outer: Any) -> bool:
     """Whether an alternative is out of the question: it requires a list, say, and the value is a text."""
-    at = list(inner.absolute_schema_path)[len(list(outer.absolute_schema_path))]
-    alternative = outer.validator_value[at]
+    alternative = outer.validator_value[_way(inner, outer)]
     kinds = alternative.get("type", []) if isinstance(alternative, dict) else []
     return inner.validator == "type" and list(inner.absolute_path) == list(outer.absolute_path) and bool(kinds)
 
 
-def _nearest(errors: list[Any], outer: Any) -> list[Any]:
-    """The faults under the only alternative that all the keys present fit, if exactly one does."""
+def _narrowed(errors: list[Any], outer: Any, validator: str) -> list[Any]:
+    """The errors under the alternatives that do not fail like this at the value itself (for a word: at one of its
+    keys), if there are such alternatives."""
+    deep = len(outer.absolute_path) + (validator == "const")
+    strange = {_way(e, outer) for e in errors if e.validator == validator and len(e.absolute_path) == deep}
+    return [e for e in errors if _way(e, outer) not in strange] or errors
 
-    def at(inner: Any) -> Any:
-        return list(inner.absolute_schema_path)[len(list(outer.absolute_schema_path))]
 
-    own = [e for e in errors if list(e.absolute_path) == list(outer.absolute_path)]
-    strange = {at(e) for e in own if e.validator in ("additionalProperties", "required")}
-    near = [e for e in errors if at(e) not in strange]
-    return near if len({at(e) for e in near}) == 1 else errors
+def _closed(errors: list[Any], outer: Any) -> list[Any]:
+    """The errors about one value for which each of several alternatives has other words, if there is such a value."""
+    words = [e for e in errors if e.validator in ("const", "enum")]
+    ways = {_way(e, outer) for e in errors}
+    same = ([e for e in words if e.absolute_path == one.absolute_path] for one in words)
+    return next((found for found in same if len(ways) > 1 and {_way(e, outer) for e in found} == ways), [])
 
 
 def _alternatives(schemas: Iterable[Any]) -> str:
@@ -253,16 +270,8 @@ _KINDS = {
 
 
 def _show(value: Any) -> str:
-    match value:
-        case None:
-            return "nothing"
-        case dict():
-            return "a mapping"
-        case list():
-            return "a list"
-        case bool():
-            return "true" if value else "false"
-        case str():
-            return repr(value if len(value) <= 60 else value[:57] + "…")
-        case _:  # a number, a truth value or None
-            return str(value)
+    if isinstance(value, str):
+        return repr(value if len(value) <= 60 else value[:57] + "…")
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    return {type(None): "nothing", dict: "a mapping", list: "a list"}.get(type(value), str(value))

@@ -40,9 +40,7 @@ def without_words(system: System) -> Iterator[Diagnostic]:
         if not told and statement.span is not None and _own(statement, system.plan):
             hint = f"add  says: …  (at most {STATEMENT_WORDS} words), and  who: …, until: …"
             if not statement.because and statement.place.startswith("environment."):  # `constant: true`
-                hint = (
-                    "an assumption's reason is none for this: write  constant: {because: …, says: …, who: …, until: …}"
-                )
+                hint = "it needs a reason of its own: write  constant: {because: …, says: …, who: …, until: …}"
             message = f"{statement.place}: no plain words yet"
             yield Diagnostic("PLAN128", message, statement.span, Severity.WARNING, hint)
 

@@ -18,6 +18,7 @@ import yaml
 from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.base.plain import invisible
 from avow.base.records import dataclass
+from avow.base.suggestions import did_you_mean
 from avow.base.tuning.sizes import PLAN_BYTES, PLAN_DEPTH, PLAN_PIECES
 from avow.system.plan import Located
 
@@ -252,7 +253,11 @@ class _Builder:
             raise self.reject(event, "PLAN102", "a key must be plain text")
         piece = self.anchors.get(event.anchor)
         if piece is None:
-            raise self.reject(event, "PLAN101", f"the alias *{event.anchor} is used before or without its anchor")
+            hint = (
+                did_you_mean(event.anchor, self.anchors)
+                or f"write the value here, or `&{event.anchor}` before it above"
+            )
+            raise self.reject(event, "PLAN101", f"the alias *{event.anchor} is used before or without its anchor", hint)
         self.put(event, piece)
 
     def remember(self, anchor: str | None, piece: Piece) -> None:
@@ -299,8 +304,8 @@ class _Builder:
     def problem(self, event: Any, code: str, message: str, *notes: tuple[str, Span | None]) -> None:
         self.problems.append(Diagnostic(code, message, self.span(event), notes=notes))
 
-    def reject(self, event: Any, code: str, message: str) -> Rejected:
-        return Rejected(Diagnostic(code, message, self.span(event)))
+    def reject(self, event: Any, code: str, message: str, hint: str | None = None) -> Rejected:
+        return Rejected(Diagnostic(code, message, self.span(event), hint=hint))
 
 
 def _places(piece: Piece, path: tuple[str | int, ...]) -> Iterator[tuple[tuple[str | int, ...], Span]]:

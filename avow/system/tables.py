@@ -70,9 +70,7 @@ def read_rows(name: str, piece: Piece) -> tuple[Table | None, tuple[Diagnostic, 
         entries = row.entries or {}
         odd = set(columns) ^ set(entries)
         if odd:
-            message = (
-                f"scenario.{name}[{number}]: the columns are {', '.join(columns)}; odd here: {', '.join(sorted(odd))}"
-            )
+            message = f"scenario.{name}[{number}]: its columns are {', '.join(columns)}; odd: {', '.join(sorted(odd))}"
             faults.append(Diagnostic("PLAN109", message, row.span))
             continue
         found.append(tuple(entries[column].text for column in columns))

@@ -111,7 +111,8 @@ def unknown_types(plan: Plan, contract: Contract) -> Iterator[Diagnostic]:
             continue
         package = kind.partition("/")[0]
         if package in packages:
-            near = [f"`{name}`" for name in nearest(kind, (k for k in known.messages if k.startswith(f"{package}/")))]
+            own = (name.partition("/")[2] for name in known.messages if name.startswith(f"{package}/"))
+            near = [f"`{package}/{name}`" for name in nearest(kind.partition("/")[2], own)]
             text = f"nothing defines {kind}"
         else:
             near = [f"the package `{name}`" for name in nearest(package, packages, alike=0.75)]

@@ -225,6 +225,7 @@ def test_wrong_types_remaps_and_publishers_are_told_by_check_in_one_round(
     [
         ("my/Sped", ""),
         ("my/Speed", "nothing defines my/Speed"),
+        ("my/Gear", "nothing defines my/Gear"),
         ("mine/Sped", "the package mine"),
         ("std_srvs/SetBool", "which part of a call"),
     ],
@@ -243,6 +244,7 @@ def test_types_that_nothing_defines(tmp_path: Path, kind: str, message: str) -> 
     )  # a missing package is one warning, and a missing type one for each topic
     assert [message in d.message for d in found] == ([True] * twice if message else [])
     assert all("under `messages`" in str(d.hint) for d in found if "part of a call" not in message)
+    assert all(("did you mean" in str(d.hint)) == (kind == "my/Speed") for d in found)
 
 
 def test_a_folder_of_messages_with_a_slip_in_its_name_is_told(tmp_path: Path) -> None:

@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 from helpers import keys_of
 
+from avow.backend_kit import given
 from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.base.remembered import Shelf
 from avow.system import schema
@@ -87,7 +88,7 @@ def test_scalars_are_never_guessed(text: str, value: object) -> None:
             94,
             "calendar",
         ),
-        ("scenario:\n  t: [{a: 1}, {b: 2}]\n", 2, 15, "odd here: a, b"),
+        ("scenario:\n  t: [{a: 1}, {b: 2}]\n", 2, 15, "odd: a, b"),
         ("scenario:\n  t: [{a: 1}]\n  interpret: {in.x: t(b)}\n", 3, 21, "no column 'b'"),
         ("scenario:\n  interpret: {in.x: u(b)}\n", 2, 21, "no table 'u'"),
         ("scenario:\n  domains: {REAL: 5..1}\n", 2, 19, "empty"),
@@ -143,6 +144,30 @@ def test_options_that_depart_from_a_schema_are_told_in_words(options: dict[str, 
         del schema["oneOf"]
     found = violations(Located(options, Span("plan.yaml", 1, 1, 1, 2)), schema, "n: tool")
     assert [d.message for d in found] == [message]
+
+
+@pytest.mark.parametrize(
+    ("options", "message", "hint"),
+    [
+        (
+            {"answers": {"by": "stmap"}},
+            "answers.by: 'stmap' is not one of arrival, order, call, stamp, key, latency",
+            "did you mean `stamp`?",
+        ),
+        ({"answers": {"by": "key", "input": "a"}}, "answers: the key 'output' is missing", None),
+        ({"answers": {"by": "stamp", "inputs": "a"}}, "answers: unknown key 'inputs'", "did you mean `input`?"),
+        ({"mapping": {"in.r": {"nan": "nil"}}}, "mapping.in.r.nan: none is wanted, not 'nil' (", "write `none`"),
+    ],
+)
+def test_a_slip_in_one_of_several_forms_is_one_fault(options: dict[str, Any], message: str, hint: str | None) -> None:
+    (found,) = violations(Located(options, Span("plan.yaml", 1, 1, 1, 2)), given.schema(given.READING))
+    assert found.message.startswith(message)
+    assert found.hint == hint
+
+
+def test_an_alias_without_its_anchor_has_a_remedy(tmp_path: Path) -> None:
+    assert [d.hint for d in faults(tmp_path, "a: &runs 1\ntitle: *run\n")] == ["did you mean `runs`?"]
+    assert [d.hint for d in faults(tmp_path, "title: *run\n")] == ["write the value here, or `&run` before it above"]
 
 
 def test_did_you_mean(tmp_path: Path) -> None:

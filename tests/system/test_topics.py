@@ -117,6 +117,15 @@ def test_what_does_not_fit_is_told(tmp_path: Path, text: str, plan: str, codes: 
     assert told(tmp_path, text, plan) == codes
 
 
+def test_a_slip_in_one_of_two_topics_is_no_crossed_connection(tmp_path: Path) -> None:
+    text = node("a", "", "x : REAL, z : REAL", "p/P thurst matches(out.x), p/P thrust matches(out.z)")
+    text += node("b", "x : REAL, z : REAL", "", "p/P thrust matches(in.x), p/P thrust matches(in.z)")
+    with pytest.raises(Rejected) as caught:
+        dataflow(make(tmp_path, text))
+    (found,) = caught.value.diagnostics
+    assert (found.code, found.hint) == ("ROS115", "a.x is published on `/thurst`: did you mean `/thrust`?")
+
+
 def test_an_end_without_a_topic_links_by_name(tmp_path: Path) -> None:
     assert edges(make(tmp_path, node("a", "", "y : REAL") + sink())) == ["a.y → b.y"]
     assert edges(make(tmp_path, SOURCE + node("b", "x : REAL"))) == ["a.x → b.x"]
