@@ -20,7 +20,6 @@ from avow.backend_kit.timeline import picture
 from avow.base.codec import document
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.plain import listed
-from avow.base.suggestions import nearest
 from avow.base.workspace import system_folder
 from avow.ros.bags import digest_trace
 from avow.system.load import load_system
@@ -34,7 +33,7 @@ from .observing import method_of, said
 from .options import origin
 from .session import Session, session, violation_json
 from .tuning import VIOLATIONS_SHOWN
-from .watched import Violation, coverage
+from .watched import Violation, coverage, silent_topic
 
 
 @click.command()
@@ -254,6 +253,9 @@ def _anything_judged(running: Session) -> bool:
 
 
 def _print_summary(running: Session) -> None:
+    silent = (topic for monitor in running.monitors for topic in monitor.silent.values() if running.unheard)
+    for topic in dict.fromkeys(silent):
+        click.echo(f"  {silent_topic(topic, running.unheard)}")
     for monitor, name, kind, tally in running.clauses():
         words = [coverage(tally) if tally.published else f"judged {tally.judged} times"]
         if tally.judged and not tally.triggered and not tally.broken:
@@ -281,9 +283,6 @@ def _print_summary(running: Session) -> None:
         told = listed([f"{topic} ({count})" for topic, count in running.unheard.items()], 10)
         click.echo(f"topics of the trace that no clause speaks of, and their events: {told}")
         click.echo(f"topics listened to: {', '.join(running.topics) or 'none'}")
-        for topic in dict.fromkeys(topic for monitor in running.monitors for topic in monitor.silent.values()):
-            meant = [f": did you mean `{name}`?" for name in nearest(topic, running.unheard, alike=0.75)]
-            click.echo("".join((f"  no message came on {topic}", *meant)))
     summary = [f"{count} × {fault}" for fault, count in running.counts.items()]
     if not any(True for _ in running.clauses()):
         summary.append("nothing was judged: write what a node promises in place of `to_write`")

@@ -73,6 +73,8 @@ class Monitor:
     settled: set[int] = field(default_factory=set)
     """The ids of the clauses whose answers were judged since this was last emptied."""
     _latest: Fraction | None = None
+    unread: dict[str, str] = field(default_factory=dict)
+    """The variables of which a message could not be read, and why the first could not."""
     supposed: set[str] = field(default_factory=set)
     """The variables that have an initial value of the plan, and no message yet."""
     questions: int = OPEN_QUESTIONS
@@ -194,6 +196,7 @@ class Monitor:
             except MappingError as error:
                 if self.tallies:  # a node without clauses to judge misses no value
                     found.append(self.violation(Fault.MAPPING, name, event, str(error)))
+                self.unread.setdefault(name, str(error))
                 self.miss({name})
                 # Its value is now unknown: clauses that need it wait for the next good message.
                 if of_latest(self.setup.rules[name]):

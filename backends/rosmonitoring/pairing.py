@@ -310,7 +310,9 @@ class Pairing:
         if asked.key is None:
             return "the answer has no key"
         known = self.seen.get(name)
-        alike = known.by_key.get(asked.key) if known is not None else None
+        if known is None:
+            return f"no message of {name} came"
+        alike = known.by_key.get(asked.key)
         if not alike:
             return f"no message of {name} bears the answer's {self.answers.by}: pair them in another way (`answers`)"
         if len(alike) == 1:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy.typing as npt
 
+from avow.backend_kit.given import misshapen
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.suggestions import suggest
 from avow.formulas.formula import free_variables
@@ -18,6 +19,7 @@ from avow.ros.bags import is_bag, recorded
 from avow.ros.definitions import Definitions
 from avow.system.plan import System
 
+from .backend import SCHEMA
 from .batch import of_arrays, of_messages
 from .blame import Blame
 from .columns import Columns
@@ -191,7 +193,7 @@ class Session:
         """The clauses of monitored nodes for which too few publications were decided, each with a proposal for the
         plan, or the reason."""
         return {
-            f"{monitor.setup.node.name}.{name}": remedies(tally, monitor.silent) or tally.reason
+            f"{monitor.setup.node.name}.{name}": remedies(tally, monitor.silent, monitor.unread) or tally.reason
             for monitor, name, kind, tally in self.clauses()
             if monitor.setup.node.name in self.asked
             and not tally.hidden
@@ -287,7 +289,11 @@ def session(
     for name in nodes or known:
         if name not in known:
             raise Rejected(Diagnostic("MON104", f"there is no node '{name}'", hint=suggest(name, known)))
-        found, problems = setup(system, known[name], method_of(system, name), types)
+        options = method_of(system, name)
+        if options is not None and (wrong := misshapen(SCHEMA, options, f"nodes.{name}: {NAME}")):
+            faults += wrong
+            continue
+        found, problems = setup(system, known[name], options, types)
         faults += problems
         faults += readable(found, trace, origin(system)) if trace is not None and not problems else ()
         if not problems:

@@ -10,8 +10,9 @@ from avow.base.verdict import Counterexample, Outcome, Verdict
 
 from .engine import Monitor
 from .lanes import Marks, Signals
+from .options import same_topic
 from .tuning import VIOLATIONS_KEPT
-from .watched import Fault, Violation, coverage, old, remedies
+from .watched import Fault, Violation, coverage, old, remedies, silent_topic
 
 
 class Run:
@@ -84,7 +85,8 @@ class Shown:
 
     @property
     def wanted(self) -> str:
-        found = (remedies(run.monitor.tallies[self.name], run.monitor.silent) for run in self.runs)
+        each = ((run.monitor.tallies[self.name], run.monitor) for run in self.runs)
+        found = (remedies(tally, monitor.silent, monitor.unread) for tally, monitor in each)
         return "; ".join(dict.fromkeys(filter(None, found)))
 
     @property
@@ -182,7 +184,8 @@ def _never(s: Shown) -> Answer | None:
     monitors = [run.monitor for run in s.runs]
     silent = sorted({topic for monitor in monitors for topic in monitor.silent.values()})
     heard = sorted({topic for monitor in monitors for topic in monitor.heard})
-    topics = f": no message on {', '.join(silent)}; the traces have {', '.join(heard[:12]) or 'no topic'}"
+    gone = "; ".join(silent_topic(topic, {*heard} - {same_topic(name) for name in s.setup.topics}) for topic in silent)
+    topics = f": {gone}; the traces have {', '.join(heard[:12]) or 'no topic'}"
     return Answer(Verdict.UNKNOWN, f"the traces never gave all the values that it speaks of{topics if silent else ''}")
 
 

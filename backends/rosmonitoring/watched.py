@@ -9,6 +9,7 @@ from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
 from avow.base.records import dataclass
+from avow.base.suggestions import nearest
 from avow.base.tuning.effort import JUDGE_EFFORT
 from avow.evaluation.evaluate import NotEvaluable
 from avow.evaluation.truth import judge, judge_open
@@ -135,15 +136,25 @@ def coverage(tally: Tally) -> str:
 DEPENDS = "it depends on which of its inputs the answer answered"
 
 
-def remedies(tally: Tally, silent: Mapping[str, str]) -> str:
-    """Proposals for the plan, so that a clause of which too little was decided is monitored. `silent`: the variables
-    whose topic had no message: no initial value would help."""
+def silent_topic(topic: str, heard: Iterable[str]) -> str:
+    """`heard`: the topics of the trace that nobody listens to."""
+    near = nearest(topic, (f"/{name.lstrip('/')}" for name in heard), alike=0.75)
+    return "".join((f"no message came on {topic}", *(f": did you mean `{name}`?" for name in near)))
+
+
+def remedies(tally: Tally, silent: Mapping[str, str], unread: Mapping[str, str]) -> str:
+    """Proposals for the plan, so that a clause of which too little was decided is monitored. No initial value would
+    help for `silent`, the variables whose topic had no message, and for `unread`, those of which a message could not be
+    read, and why."""
     share = int(100 * tally.decided / tally.asked) / 100 if tally.asked else 0
-    late = ", ".join(name for name in tally.awaited if name not in silent)
-    gone = ", ".join(dict.fromkeys(silent[name] for name in tally.awaited if name in silent))
+    wanted = dict.fromkeys((*tally.awaited, *tally.reason.split()))
+    late = ", ".join(name for name in tally.awaited if name not in silent and name not in unread)
+    gone = ", ".join(dict.fromkeys(silent[name] for name in wanted if name in silent))
+    wrong = "; ".join(f"{name}: {unread[name]}" for name in wanted if name in unread)
     said = f"say what it was before its first message, mapping: {{{late.partition(',')[0]}: {{…, initial: …}}}}"
     parts = (
         (gone, f"no message came on {gone}: correct the topic in the contract, or record it"),
+        (wrong, f"a message could not be read: {wrong}"),
         (late, f"{late} had no value when answers came (a latched topic, or a late publisher): {said}"),
         (tally.order and tally.unpaired, "pair answers with inputs by a stamp or a key (`answers`)"),
         (tally.reason == DEPENDS, "pair answers by a stamp or a key, or measure a shorter latency (`answers`)"),

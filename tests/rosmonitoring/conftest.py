@@ -92,7 +92,8 @@ def make_system(tmp_path: Path) -> Callable[..., System]:
         if messages:
             plan_parts = {"messages": ["msgs"], **plan_parts}
         name = rcl.split("node", 1)[1].split("{", 1)[0].strip()
-        options = {"answers": ARRIVAL, **more, "mapping": mapping or {}}
+        given = {"answers": ARRIVAL, **more, "mapping": mapping or {}}
+        options = {name: option for name, option in given.items() if option is not None}
         plan = {"contract": "system.rcl", "nodes": {name: {"methods": [{"rosmonitoring": options}]}}, **plan_parts}
         (folder / "plan.yaml").write_text(json.dumps(plan), encoding="utf-8")
         return load_system(folder)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import math
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -15,8 +16,10 @@ from avow.backends.rosmonitoring import BACKEND, options
 from avow.backends.rosmonitoring.command import _Output, _told
 from avow.backends.rosmonitoring.engine import Monitor
 from avow.backends.rosmonitoring.session import Session, session
+from avow.backends.rosmonitoring.watched import Fault
 from avow.base.diagnostics import Rejected
 from avow.base.verdict import Outcome, Verdict
+from avow.pipeline.plan_check import of_plan
 from avow.system.plan import System
 
 from .conftest import job_for
@@ -133,8 +136,20 @@ def test_a_time_without_a_unit_is_one_fault(make_system: Make, options: dict[str
 
     with pytest.raises(Rejected) as caught:
         session(make_system(ONE, {}, **options))
-    assert [d.code for d in caught.value.diagnostics] == ["MON101"] * count
-    assert all("a time with a unit is wanted, such as 50 ms" in d.message for d in caught.value.diagnostics)
+    assert [d.code for d in caught.value.diagnostics] == ["PLAN105"] * count
+    assert all("a time with a unit, such as 50 ms" in d.message for d in caught.value.diagnostics)
+
+
+def test_a_slip_in_the_mapping_is_one_fault_for_check_and_monitor(make_system: Make) -> None:
+    """The other entries are read: the fields that they name are not in doubt."""
+    messages = {"a/V": "float64 x\nfloat64 y\n"}
+    rcl = ONE.replace("std_msgs/Float64 r", "a/V r").replace("std_msgs/Float64 v", "a/V v")
+    mapping = {"in.r": {"field": "x", "nan": "nil", "elsewhere": 0}, "out.v": "y"}
+    system = make_system(rcl, mapping, messages=messages)
+    assert [d.code for d in of_plan(system) if d.is_error] == ["PLAN105"]
+    system = make_system(rcl, {"in.r": "x", "out.v": "y"}, messages=messages, answers={"by": "arrival", "because": "…"})
+    with pytest.raises(Rejected, match="a reason in words"):
+        session(system)
 
 
 def test_a_step_before_that_nothing_showed_is_no_observation(make_system: Make, tmp_path: Path) -> None:
@@ -259,9 +274,29 @@ def test_a_topic_that_never_came_is_told_and_no_initial_value_advised(
     assert _told(running, running.run(trace), str(trace), _Output(False, False, None, None)) == 1
     told = capsys.readouterr().out
     assert "initial" not in told
+    assert "bears" not in told
     assert "n.g: no message came on /level: correct the topic in the contract, or record it" in told
     assert f"  no message came on /level{': did you mean ' + meant + '?' if meant else ''}\n" in told
     assert told.count("did you mean") == bool(meant)
+
+
+@pytest.mark.parametrize(
+    "answers", [{"by": "arrival", "because": "one process"}, {"by": "key", "input": "k", "output": "k"}]
+)
+def test_no_initial_value_is_advised_for_what_could_not_be_read(
+    make_system: Make, tmp_path: Path, answers: dict[str, Any]
+) -> None:
+    """The message says what helps: `nan`."""
+    system = make_system(ONE, {"in.r": "data", "out.v": "data"}, answers=answers)
+    trace = tmp_path / "t.jsonl"
+    said = [{"topic": topic, "k": k // 2, "time": k / 10} for k, topic in enumerate(["r", "v"] * 10)]
+    texts = (json.dumps({**event, "data": math.nan if event["time"] == 0.8 else 1.0}) for event in said)
+    trace.write_text("".join(f"{text}\n" for text in texts), encoding="utf-8")
+    running = session(system, ("n",), trace)
+    assert [v.fault for _, v in running.run(trace)] == [Fault.MAPPING]
+    advice = running.unmonitored()["n.g"]
+    assert "in.r: nan is not a number; if it means no reading, map it" in advice
+    assert "initial" not in advice
 
 
 @pytest.mark.parametrize("decided", [None, 0.5])
