@@ -128,19 +128,29 @@ def load(path: str, function: str, drive: Any = None) -> Any:
     module = importlib.util.module_from_spec(spec)
     sys.modules["avow_subject"] = module
     sys.path.insert(0, os.path.dirname(path))  # noqa: PTH120 - its neighbours, as if it were run
-    spec.loader.exec_module(module)
+    try:
+        spec.loader.exec_module(module)
+    except ModuleNotFoundError as error:
+        near = _near(str(error.name), {name.partition(".")[0] for name in sys.modules})
+        error.msg += near or f": install it where Avow runs, or put its file beside {os.path.basename(path)}"  # noqa: PTH119
+        raise
     driven = json.loads(function) if drive is not None else None
     name = function if driven is None else driven["class"]
     try:
         found = getattr(module, name)
     except AttributeError:
-        import difflib
-
-        near = difflib.get_close_matches(name, [each for each in vars(module) if not each.startswith("_")], 1)
         kind = "function" if driven is None else "class"
-        hint = f": did you mean {near[0]}?" if near else ""
-        raise AttributeError(f"{os.path.basename(path)} has no {kind} {name!r}{hint}") from None  # noqa: PTH119
+        near = _near(name, {each for each in vars(module) if not each.startswith("_")})
+        raise AttributeError(f"{os.path.basename(path)} has no {kind} {name!r}{near}") from None  # noqa: PTH119
     return found if driven is None else drive(found, driven)
+
+
+def _near(name: str, known: set[str]) -> str:
+    """The known name that was probably meant, as the end of a message."""
+    import difflib
+
+    near = difflib.get_close_matches(name, sorted(known), 1)
+    return f": did you mean {near[0]}?" if near else ""
 
 
 def driving(function: str) -> Any:

@@ -19,6 +19,7 @@ from avow.assurance.certification import KernelRun
 from avow.assurance.codec import SCHEMA, read_case
 from avow.assurance.facts import facts_of_system
 from avow.assurance.model import Case, Derivation, MethodInfo, RunInfo, SideCondition, ToolInfo
+from avow.assurance.naming import short
 from avow.assurance.signed import KEYS, newest_signed
 from avow.backend_kit.registry import backend, names
 from avow.base.diagnostics import Rejected
@@ -35,6 +36,7 @@ from avow.evidence.heads import index_path, read_index
 from avow.evidence.ledger import Entry, Ledger, ledger_of
 from avow.evidence.record import CASE, RETRY
 from avow.evidence.signing import private_key
+from avow.evidence.status import Status
 from avow.pipeline import check as checking
 from avow.pipeline.doctor import findings
 from avow.pipeline.integrity import acknowledge, confirm, discrepancies
@@ -262,6 +264,7 @@ def _summarise(state: State, surveyed: Survey, case: Case) -> Result:
     for g in case.gates:
         closes = [s.text for s in g.suggestions[:3]] if explain or not g.passed else []
         gates.append((g.title, g.passed, "; ".join([g.reason, *(f"next: {text}" for text in closes)])))
+    failed = [f"{short(item.claim)}: {item.text}" for item in case.open_items if item.kind == Status.ERROR.value]
     index = state.workspace.relative(state.workspace.report(surveyed.system.name) / "index.html")
     counts = Counter(view.status.value for view in case.obligations if not view.obligation.advisory)
     return Result(
@@ -273,6 +276,7 @@ def _summarise(state: State, surveyed: Survey, case: Case) -> Result:
         verdict=case.answers.told,
         tone=case.answers.tone.value,
         lines=tuple(terminal_lines(case)),
+        failed=tuple(failed),
     )
 
 

@@ -27,6 +27,8 @@ class Result:
     """The verdict's colour: a known failure is amber, and a system without required gates is grey."""
     lines: tuple[str, ...] = ()
     """The five answers, for a terminal."""
+    failed: tuple[str, ...] = ()
+    """The methods that ended with an error: the claim, the method and its reason."""
 
 
 @dataclass(slots=True)

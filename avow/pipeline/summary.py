@@ -15,7 +15,7 @@ from avow.base.codec import Unreadable, document, from_text
 from avow.base.files import read_regular
 from avow.base.plain import count
 from avow.base.rendering import printable
-from avow.base.tuning.shown import GATE_REASON
+from avow.base.tuning.shown import GATE_REASON, WARNINGS
 from avow.pipeline.results import Result
 
 GOOD = ("proved", "checked", "tested", "monitored", "reviewed", "justified")
@@ -57,6 +57,10 @@ def print_summary(
             if not passed:
                 console.print(f"[red]✗[/] {r.system}: ", end="")
                 console.print(f"{title}: {_few(reason)}", markup=False)
+        more = len(r.failed) - WARNINGS
+        for text in (*r.failed[:WARNINGS], *([f"and {more} more methods without an answer"] if more > 0 else [])):
+            console.print(f"[yellow]![/] {r.system}: ", end="")
+            console.print(printable(text), markup=False)
     for file, why in _left_out(results):
         console.print("[yellow]–[/] ", end="")
         console.print(printable(f"{file}: {why}"), markup=False)

@@ -114,7 +114,7 @@ def drive(*arguments: object) -> Result:
 def told(result: Result) -> str:
     """What was rejected."""
     assert isinstance(result.exception, Rejected), result.exception
-    return " ".join(d.message for d in result.exception.diagnostics)
+    return " ".join(f"{d.message} [{d.hint}]" for d in result.exception.diagnostics)
 
 
 @pytest.mark.slow
@@ -349,7 +349,11 @@ def test_typed_parameter_values_and_exclusive_groups_are_driven(tmp_path: Path) 
     ("old", "new", "why"),
     some(
         [
-            ('"r", Float64', '"q", Float64', "never subscribes to /r"),
+            (
+                '"r", Float64',
+                '"q", Float64',
+                "never subscribes to /r, which carries r: it subscribes to /q [correct the topic in the",
+            ),
             ('"r", Float64', '"r", String', "subscribes to /r as std_msgs/String"),
             ('"status", String', '"~status", String', "never publishes /status"),
             (
@@ -388,7 +392,11 @@ def test_what_a_callback_raises_has_its_message_topic_and_line(tmp_path: Path, k
 LOADED = [  # the first line of the file, and what is told if it cannot be loaded
     ("from .helper import x", "no known parent package (watch.py, line 1); instead: `from NAME import"),
     ("from rospy import Rate", "Rate is not driven; instead: Timer (watch.py, line 1)"),
-    ("import no_such_module", "No module named 'no_such_module' (watch.py, line 1)"),
+    (
+        "import no_such_module",
+        "'no_such_module': install it where Avow runs, or put its file beside watch.py (watch.py",
+    ),
+    ("import std_msg.msg", "No module named 'std_msg': did you mean std_msgs? (watch.py, line 1)"),
     ("1 / 0", "division by zero (watch.py, line 1)"),
 ]
 

@@ -97,6 +97,16 @@ def test_a_plan_below_a_system_that_does_not_take_it_in_is_left_out(tmp_path: Pa
     ] * told
 
 
+@pytest.mark.parametrize("number", [0, 1, 5])
+def test_a_method_that_ended_with_an_error_is_named_though_every_gate_passes(number: int) -> None:
+    """Other evidence may support the claim, such as a recording of an earlier program."""
+    failed = tuple(f"n.g{k}: hypothesis: it never subscribes to /r" for k in range(number))
+    out = io.StringIO()
+    print_summary([Result("a", 0, {"monitored": 1}, "r/a/i.html", (), failed=failed)], (), (), 0, 0.1, out)
+    assert out.getvalue().count("! a: n.g") == min(number, 3)
+    assert ("and 2 more methods" in out.getvalue()) is (number == 5)
+
+
 def test_what_is_left_out_is_told_in_every_summary_once() -> None:
     one, plan = ("contracts/old/plan.yml", "misnamed"), ("contracts/crane/spare/plan.yaml", "not verified [CLI021]")
     gates = (("all", True, "fine"),)

@@ -17,10 +17,10 @@ from avow.backend_kit.programs.samples import Pool, leaves, numbers_of, pool, wr
 from avow.base.diagnostics import Diagnostic, Rejected, Severity
 from avow.base.files import inside, read_text
 from avow.base.process import ToolMissing
-from avow.base.suggestions import did_you_mean, suggest
+from avow.base.suggestions import did_you_mean, nearest, suggest
 from avow.base.tuning.running import DRIVEN_CALLBACKS, DRIVEN_MEGABYTES, DRIVEN_SECONDS, LONGEST_GAP, NUMBERS_AGAIN
 from avow.isolation.observed import Seen
-from avow.language.contract import Node
+from avow.language.contract import Node, Topic
 from avow.language.sorts import DataSort, EnumSort
 from avow.language.terms import Role
 from avow.ros.bags import fields_of
@@ -118,20 +118,24 @@ class Driver:
 
     def fits(self) -> Iterator[Diagnostic]:
         """Topics of the contract that the class does not use, or uses with other message types."""
-        for topic in self.node.topics:
-            if topic.port is None:
-                continue
-            name, kind = whole_name(self.system.plan.ros.names, self.node, topic), canonical(topic.ros_type)
-            both = {**self.topics.heard, **self.topics.spoken}
-            side = both if topic.port.role is Role.INPUT else self.topics.spoken
-            verb = "subscribes to" if topic.port.role is Role.INPUT else "publishes"
-            if name not in side:
-                there = f"it {verb} {', '.join(sorted(side)) or 'nothing'}"
-                text = f"{self.source.class_name} never {verb} {name}, which carries {topic.port.name}: {there}"
-                yield Diagnostic("DRIVE102", text, topic.span)
-            elif side[name] != kind:
-                text = f"{self.source.class_name} {verb} {name} as {side[name]}; the contract says {kind}"
-                yield Diagnostic("DRIVE102", text, topic.span)
+        wanted: dict[tuple[str, Role], list[Topic]] = {}
+        for topic in (topic for topic in self.node.topics if topic.port):
+            name = whole_name(self.system.plan.ros.names, self.node, topic)
+            wanted.setdefault((name, topic.port.role), []).append(topic)  # type: ignore[union-attr]
+        for (name, role), alike in wanted.items():
+            verb, own = (
+                ("subscribes to", self.topics.heard) if role is Role.INPUT else ("publishes", self.topics.spoken)
+            )
+            found, kind = {**own, **self.topics.spoken}.get(name), canonical(alike[0].ros_type)
+            text, hint = f"{verb} {name} as {found}; the contract has {kind}", "correct the type in one of them"
+            if found is None:
+                ports = ", ".join(topic.port.name for topic in alike if topic.port)
+                near = nearest(name, own.keys() - {known for known, _ in wanted}) or sorted(own)
+                text = f"never {verb} {name}, which carries {ports}: it {verb} {', '.join(near) or 'nothing'}"
+                remap = f"ros: {{nodes: {{{self.node.name}: {{remap: {{{(*near, '…')[0]}: {name}}}}}}}}}"
+                hint = f"correct the topic in the class or in the contract; if it is remapped on the robot, {remap}"
+            if found != kind:
+                yield Diagnostic("DRIVE102", f"{self.source.class_name} {text}", alike[0].span, hint=hint)
 
     def coded(self, topic: str, event: Mapping[str, Any], where: str) -> Any:
         """A recorded event's message as data; a missing field has the default of a new message. Raises Rejected."""
@@ -144,8 +148,7 @@ class Driver:
     def fields(self, event: Event) -> dict[str, Any]:
         """A message's fields as a recording has them."""
         kind = self.topics.heard.get(event.topic) or self.topics.spoken[event.topic]
-        found: dict[str, Any] = shown(Nested(kind), event.data, self.known, self.source.kind)
-        return found
+        return shown(Nested(kind), event.data, self.known, self.source.kind)  # type: ignore[no-any-return]
 
     def generated(self, messages: int, seed: int | str) -> Iterator[Event]:
         """So many messages on its subscriptions, made from the numbers and words of contract, program and
@@ -218,8 +221,7 @@ def driver(system: System, name: str) -> Driver:
     found = Driver(system, node, source, subject, known, topics)
     if found.topics.wrong:
         raise _refused(source, f"{source.class_name} is not made: {found.topics.wrong}")
-    wrong = tuple(found.fits())
-    if wrong:
+    if wrong := tuple(found.fits()):
         raise Rejected(*wrong)
     return found
 
@@ -343,13 +345,9 @@ def code(wire: Wire, value: Any, known: Definitions) -> Any:
             if found is None:
                 raise ValueError(f"{value!r} is no time of seconds and nanoseconds")
             return {"i": str(int(value[found[0]]) * SECOND + int(value[found[1]]))}
-        case Scalar(name="bool"):
-            if not isinstance(value, bool):
-                raise ValueError(f"{value!r} is no bool")
-            return value
-        case Scalar(name="string" | "wstring"):
-            if not isinstance(value, str):
-                raise ValueError(f"{value!r} is no text")
+        case Scalar(name="bool" | "string" | "wstring" as name):
+            if not isinstance(value, bool if name == "bool" else str):
+                raise ValueError(f"{value!r} is no {'bool' if name == 'bool' else 'text'}")
             return value
         case Scalar(name=name) if name in INTEGERS:
             low, high = INTEGERS[name]
@@ -374,12 +372,9 @@ def fresh(wire: Wire, known: Definitions) -> Any:
             return code(wire, {}, known)
         case Array(item=item, length=length):
             return {"l": [fresh(item, known) for _ in range(length or 0)]}
-        case Scalar(name="bool"):
-            return False
-        case Scalar(name="string" | "wstring"):
-            return ""
         case Scalar(name=name):
-            return {"f": (0.0).hex()} if name.startswith("float") else {"i": "0"}
+            plain: dict[str, Any] = {"bool": False, "string": "", "wstring": ""}
+            return plain.get(name, {"f": (0.0).hex()} if name.startswith("float") else {"i": "0"})
 
 
 def shown(wire: Wire, data: Any, known: Definitions, kind: Driving) -> Any:
