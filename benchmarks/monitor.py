@@ -70,6 +70,7 @@ node sensor {
 
 
 ANSWERED = {
+    "order": "{by: order, because: all links stand}",
     "key": "{by: key, input: id, output: id}",
     "stamp": "{by: stamp}",
     "latency": "{latency: 2 ms, jitter: 1 ms, because: measured}",

@@ -162,6 +162,7 @@ _PORTS = {"input": PATH, "output": PATH}
 _LATENCY = {"by": {"const": "latency"}, "latency": DURATION, "jitter": DURATION, **_BECAUSE}
 _ANSWERS = (
     mapping({"by": {"const": "arrival"}, **_BECAUSE}, "by", "because"),
+    mapping({"by": {"const": "order"}, **_BECAUSE}, "by", "because"),
     mapping({"by": {"const": "call"}}, "by"),
     mapping({"by": {"const": "stamp"}, **_PORTS}, "by"),
     mapping({"by": {"const": "key"}, **_PORTS}, "by", "input", "output"),

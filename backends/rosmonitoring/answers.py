@@ -1,7 +1,7 @@
 """How a monitor handles answers: which messages are parts of one, and those that wait for their inputs (`pairing`).
 
-The outputs of an answer on several topics are its parts: by stamp, key and call those that share it; by latency
-those that came within it. By arrival an answer is complete when each output has come since
+The outputs of an answer on several topics are its parts: by stamp, key and call those that share it; by order the k-th
+of each output; by latency those that came within it. By arrival an answer is complete when each output has come since
 the last one. An unreadable answer keeps its place.
 """
 
@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
+from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
 from avow.formulas.values import Value
@@ -17,8 +18,9 @@ from avow.language.contract import ClauseKind
 from .pairing import EARLY, Asked, Choices, Pairing, ticks, time_of
 from .reading import Reader
 from .rules import of_latest
-from .tuning import KEYS_KEPT
+from .tuning import BREACHES_IN_DOUBT, KEYS_KEPT
 from .watched import DEPENDS, Answer, Fault, Part, Violation, Watched, open_verdict
+from .word import topics_of
 
 if TYPE_CHECKING:
     from .engine import Monitor
@@ -36,10 +38,11 @@ def came(
             yield None
         else:
             tally.unreadable += 1
+            _count(monitor, watched, time_of(event))
         return
     touched: dict[object, None] = {}
     for name, readable in names.items():
-        key = _key(monitor, event)
+        key = _key(monitor, watched, name, event)
         if key is None:
             _leave(monitor, watched, event, found)
         parts = watched.fresh.setdefault(key, {})
@@ -71,10 +74,14 @@ def scatter(clauses: Iterable[Watched]) -> None:
         watched.scattered = watched.scattered or len(watched.outputs) > 1
 
 
-def finish(monitor: Monitor, watched: Watched, found: list[Violation]) -> None:
-    """The run is over: judge incomplete answers."""
+def finish(monitor: Monitor, watched: Watched, found: list[Violation]) -> str:
+    """The run is over: judge incomplete answers. Returns why parts may have been matched wrongly, if so."""
     while watched.fresh:
         monitor.judge_part(watched, watched.fresh.pop(next(iter(watched.fresh))), {}, found)
+    if len(set(watched.counted.values())) < 2 and watched.counted.keys() in (set(), watched.outputs):
+        return ""
+    counts = " and ".join(f"{watched.counted.get(name, 0)} of {name}" for name in sorted(watched.outputs))
+    return f"messages: {counts}: which are parts of one answer is not told by their order (`answers: {{by: order}}`)"
 
 
 def judge_part(
@@ -83,6 +90,7 @@ def judge_part(
     """Judge the known part of an answer that was never complete: it is decided if the rest does not matter."""
     tally = watched.tally
     monitor.lose(watched)
+    _count(monitor, watched, max(part.time for part in parts.values()))
     if any(part.values is None for part in parts.values()):
         tally.unreadable += 1
         return
@@ -100,13 +108,22 @@ def judge_part(
         found.append(replace(wrong, heard={n: at for part in parts.values() for n, at in part.heard.items()}))
 
 
+def _count(monitor: Monitor, watched: Watched, time: Fraction) -> None:
+    """Count an answer that is not paired with inputs."""
+    if monitor.pairing is not None:
+        monitor.pairing.count(watched, ticks(time))
+
+
 SCATTERED = "a message of one of several outputs was lost: which parts are of one answer is not told by their order"
 
 
-def _key(monitor: Monitor, event: Mapping[str, Any]) -> object:
+def _key(monitor: Monitor, watched: Watched, name: str, event: Mapping[str, Any]) -> object:
     pairing = monitor.pairing
     if pairing is None or pairing.answers.by == "latency":
         return None
+    if pairing.answers.by == "order":
+        watched.counted[name] = watched.counted.get(name, 0) + 1
+        return watched.counted[name]
     return pairing.key(event, pairing.answers.output)
 
 
@@ -163,20 +180,28 @@ def asks(monitor: Monitor, watched: Watched) -> tuple[str, ...]:
     return tuple(dict.fromkeys((*watched.paired, *(n for n in monitor.assumed if n in monitor.paired))))
 
 
+def judges_answers_alone(monitor: Monitor, watched: Watched) -> bool:
+    """Whether a clause is about outputs alone, of a node with assumptions on its inputs: if it is broken, the node at
+    fault depends on what the answer answered."""
+    alone = monitor.pairing is not None and watched.outputs and not watched.paired
+    return bool(alone) and not monitor.paired.isdisjoint(monitor.assumed)
+
+
 def saw(monitor: Monitor, pairing: Pairing, name: str, event: Mapping[str, Any], value: Value | None) -> None:
     """A message of an input has come (None: it could not be read)."""
     now, key = time_of(event), pairing.key(event, pairing.answers.input)
     pairing.saw(name, ticks(now), float(now), key, value, monitor.at[name][0])
 
 
-def accused(monitor: Monitor, watched: Watched, values: Mapping[str, Value]) -> bool:
-    """Whether a clause about outputs alone is broken, of a node with assumptions on its inputs: the node at fault
-    depends on what the answer answered."""
-    alone = monitor.pairing is not None and watched.outputs and not watched.paired
-    if not alone or monitor.paired.isdisjoint(monitor.assumed):
+def accused(monitor: Monitor, watched: Watched, values: Mapping[str, Value], event: Mapping[str, Any]) -> bool:
+    """Whether such a clause is broken (`judges_answers_alone`)."""
+    if monitor.pairing is None or not judges_answers_alone(monitor, watched):
         return False
     known = all(name in values and name not in monitor.supposed for name in watched.names)
-    return known and watched.truth_of(values, monitor.solver) is False
+    if known and watched.truth_of(values, monitor.solver) is False:
+        return True
+    monitor.pairing.count(watched, ticks(time_of(event)))
+    return False
 
 
 def ask(
@@ -188,6 +213,7 @@ def ask(
     missing = [n for n in watched.names if n not in monitor.paired and (n not in values or n in monitor.supposed)]
     if missing:
         watched.tally.too_early(n for n in missing if n not in monitor.supposed)
+        pairing.count(watched, ticks(now))
         return
     own = tuple(n for n in speaks(monitor, watched) if n in values)
     inputs = tuple(n for n in asks(monitor, watched) if n in watched.paired or n in pairing.seen)
@@ -231,3 +257,61 @@ def judge_answer(monitor: Monitor, asked: Asked, choices: Choices, found: list[V
             said += "; but an assumption does not hold"
         wrong = monitor.violation(verdict, watched.clause.name, asked.event, said, watched, cases[0])
         found.append(replace(wrong, index=asked.index, heard=asked.heard))
+
+
+def doubtful(monitor: Monitor, watched: Watched) -> bool:
+    """By order: whether a verdict on a clause may be about messages that do not belong together, which is known only at
+    the end of the run, if their numbers differ."""
+    setup, spoken = monitor.setup, {*watched.names}
+    if setup.answers is None or setup.answers.by != "order":
+        return False
+    if watched.clause.kind is ClauseKind.GUARANTEE:
+        return bool(setup.heard & {*spoken, *monitor.assumed}) or len(topics_of(setup, spoken)) > 1
+    return monitor.word is not None and len(topics_of(setup, spoken)) > 1
+
+
+def sure(monitor: Monitor, found: list[Violation], *, over: bool = False) -> list[Violation]:
+    """The violations that may be reported now; breaches in doubt wait for the end of the run."""
+    if not found or not monitor.by_order or (monitor.prompt and not over):
+        return found
+    told: list[Violation] = []
+    for violation in found:
+        if violation.fault is Fault.MAPPING or violation.clause not in monitor.by_order:
+            told.append(violation)
+        elif len(monitor.in_doubt) < BREACHES_IN_DOUBT:
+            monitor.in_doubt.append(violation)
+        else:
+            tally = monitor.by_order[violation.clause].tally
+            tally.reason = tally.reason or f"{BREACHES_IN_DOUBT} breaches are told, the others counted"
+    return told
+
+
+def withdraw(monitor: Monitor, found: list[Violation]) -> list[Violation]:
+    """The numbers of messages differ: verdicts on messages paired by order are undecided, unless the messages' numbers
+    show which were lost: since then, nothing was judged."""
+    if monitor.exact is not None and monitor.exact.lost and len(_sent(monitor)) == 1:
+        return found
+    for watched in monitor.by_order.values():
+        tally = watched.tally
+        tally.order += tally.judged
+        tally.judged = tally.broken = tally.excused = tally.undecided = 0
+        tally.triggered = watched.trigger is None
+        tally.reason = tally.reason or monitor.backwards
+    return [v for v in found if v.fault is Fault.MAPPING or v.clause not in monitor.by_order]
+
+
+def _sent(monitor: Monitor) -> set[int]:
+    """The number of messages that each topic of such clauses had, including those lost according to their numbers."""
+    if monitor.word is not None:
+        counts = set(monitor.word.counts.items())
+    else:
+        pairing = monitor.pairing
+        assert pairing is not None
+        by_name = [(name, known.count) for name, known in pairing.seen.items()]
+        for watched in monitor.by_order.values():
+            counted = pairing.counts.get(id(watched))
+            alone = dict.fromkeys(watched.outputs, counted.count if counted is not None else 0)
+            by_name += (watched.counted or alone).items()
+        counts = {(topic, count) for name, count in by_name for topic in topics_of(monitor.setup, (name,))}
+    passages = monitor.timing.passages
+    return {count + (passages[topic].lost if topic in passages else 0) for topic, count in counts}

@@ -22,6 +22,7 @@ from avow.base.diagnostics import Diagnostic, Rejected
 from avow.evaluation.evaluate import NotEvaluable
 from avow.ros.bags import ENVELOPE, LIVE, Event
 
+from .answers import judges_answers_alone, sure
 from .batch import NONE, UNKNOWN, UNREADABLE, Batch, Column, Flags, Floats, Ints, combinations, of_events
 from .engine import Monitor
 from .options import same_topic
@@ -83,6 +84,8 @@ class Watch:
         self._judged: dict[tuple[str, int], _Judged] = {}
         self.answers: Paired | None = None
         """The answers of the batch, if they are paired with their inputs."""
+        self.gap = False
+        """Whether a message of the batch does not have the number after that of its predecessor."""
         if monitor.pairing is not None:
             monitor.pairing.readers = {name: monitor.reader_of(name) for name in self._columns}
         self._clear()
@@ -157,6 +160,7 @@ class Watch:
 
     def _begin(self) -> None:
         monitor = self.monitor
+        self.gap = False
         if any(len(column.values) > REMEMBERED for column in self._columns.values()):
             self._clear()
         self._known.clear()
@@ -178,10 +182,14 @@ class Watch:
         array = batch.array(topic, SEQUENCE)
         if array is not None:
             numbers = np.concatenate(([-2 if last is None else last], array))
-            wrong |= numbers[1:] != numbers[:-1] + 1
+            odd: Flags = numbers[1:] != numbers[:-1] + 1
+            wrong |= odd
+            self.gap = self.gap or bool(odd[last is None :].any())
         elif last is not None or batch.numbered(topic):
             for k, number in enumerate(map(sequence, batch.of(batch.rows[topic]))):
-                wrong[k] |= number is not None if last is None else number != last + 1
+                if number is not None if last is None else number != last + 1:
+                    wrong[k] = True
+                    self.gap = self.gap or last is not None
                 last = last if number is None else number
         return wrong
 
@@ -265,6 +273,8 @@ class Watch:
                 tally.triggered = tally.triggered or bool(judged.met[low:high].any())
                 for name, ages in judged.ages.items():
                     tally.aging(name, float(ages[low:high].max()))
+                if monitor.pairing is not None and judges_answers_alone(monitor, watched):
+                    monitor.pairing.count(watched, ticks_at(batch.event(last[-1])), high - low)
         for row in sorted(last):
             monitor.caught_up(batch.event(row), batch.lines[row])
         if last:
@@ -277,7 +287,7 @@ class Watch:
         found: list[Violation] = []
         if self.monitor.pairing is not None and self.monitor.pairing.waiting:
             self.monitor.settle(ticks_at(batch.event(row)), found)
-        return found
+        return sure(self.monitor, found)
 
 
 def _spread(where: Flags, flags: Flags) -> Flags:

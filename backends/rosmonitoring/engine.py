@@ -20,7 +20,7 @@ from avow.formulas.values import Value
 from avow.language.contract import Clause, ClauseKind
 from avow.ros.bags import LIVE, publisher
 
-from .answers import accused, ask, came, finish, judge_answer, judge_part, own, saw, scatter
+from .answers import accused, ask, came, doubtful, finish, judge_answer, judge_part, own, saw, scatter, sure, withdraw
 from .latest import Doubts, SoFar, judge_latest, not_met, verdict_of
 from .memory import hear, overdue, soonest, watching
 from .options import Setup, same_topic
@@ -64,6 +64,12 @@ class Monitor:
     """The breaches that wait, if these are the latest: set once an event came from a running graph."""
     paired: frozenset[str] = frozenset()
     """The observed inputs."""
+    prompt: bool = False
+    """Breaches are reported when they are seen, even if they may be withdrawn (`by_order`)."""
+    by_order: dict[str, Watched] = field(default_factory=dict)
+    """The clauses whose verdict may be about messages that do not belong together, which is known only at the end."""
+    in_doubt: list[Violation] = field(default_factory=list)
+    """Their breaches."""
     word: Word | None = None
     """The order of the steps, if clauses speak of other steps and `answers` determines it."""
     assumed: tuple[str, ...] = ()
@@ -140,14 +146,14 @@ class Monitor:
         contains."""
         self.events += 1
         if self._clock is None:
-            return self._step(event, place)
+            return sure(self, self._step(event, place))
         found: list[Violation] = []
         now = self.events
         for number, each, where in self._clock.ready(now, event, place or now):
             self.events = number
             found += self._step(each, where)
         self.events = now
-        return found
+        return sure(self, found)
 
     def _step(self, event: Mapping[str, Any], place: int) -> list[Violation]:
         topic = event.get("topic")
@@ -171,7 +177,10 @@ class Monitor:
             return found
         if missed:
             self.miss(set(names))
-            if self.pairing is None:
+            by = "arrival" if self.pairing is None else self.pairing.answers.by
+            if self.pairing is not None:
+                self.pairing.lost = self.pairing.lost or by == "order"
+            if by in ("arrival", "order"):
                 scatter(w for name in names for w in self.clauses.get(name, ()))
         answers = self.setup.answers
         if answers is not None and answers.by == "arrival" and not self.backwards and "time" in event:
@@ -221,7 +230,7 @@ class Monitor:
             self._judge(self._constant.pop(), event, found)
         for watched, answer in self._due(updated, event, found):
             values = self.known(watched, answer)
-            if watched.paired or accused(self, watched, values):
+            if watched.paired or accused(self, watched, values, event):
                 ask(self, watched, values, answer, event)
             else:
                 self._aged(watched, event)
@@ -248,8 +257,9 @@ class Monitor:
         return self.word or self.pairing
 
     def waits(self, event: int) -> bool:
-        """Whether an answer of this event or an earlier one is not judged yet."""
-        return any(known is not None and known.waits(event) for known in (self.kept, self.word))
+        """Whether an answer of this event or an earlier one is not judged yet, or in doubt."""
+        waiting = any(known is not None and known.waits(event) for known in (self.kept, self.word))
+        return waiting or any(v.index <= event for v in self.in_doubt[:1])
 
     def known(self, watched: Watched, answer: Answer | None) -> Mapping[str, Value]:
         """The values by which an answer is judged: the latest, except those of the step before, and those of its own
@@ -349,17 +359,20 @@ class Monitor:
         if self.kept is not None:
             self.settle(None, found)
         if self.pairing is not None:
-            self.backwards = self.backwards or self.pairing.late
+            self.backwards = self.backwards or self.pairing.uneven()
         if self.word is not None:
             follow(self, self.word.finish(), found)
+            self.backwards = self.backwards or self.word.uneven
         for watched in self.about(self.clauses):
-            finish(self, watched, found)
+            self.backwards = finish(self, watched, found) or self.backwards
             watched.tally.open += watched.steps is not None and watched.steps.open
             if any(of not in self._seen for name in watched.names if (of := heard_through(self.setup.rules[name]))):
                 watched.only_supposed()
             if watched in self._timed and (why := self.timing.standing):
                 watched.tally.withdrawn(why)
-        return found
+        found = sure(self, found, over=True)
+        found, self.in_doubt = [*self.in_doubt, *found], []
+        return withdraw(self, found) if self.backwards else found
 
     def settle(self, now: Ticks | None, found: list[Violation]) -> None:
         """Judge the answers whose inputs are known at a time (None: the run is over)."""
@@ -423,6 +436,8 @@ class Monitor:
         if watched.steps is not None:
             self._remembering.append(watched)
             self._timed += [watched] if watched.steps.silence is not None else []
+        if doubtful(self, watched):
+            self.by_order[clause.name] = watched
         for name in triggers:
             self.clauses.setdefault(name, []).append(watched)
         if not triggers:

@@ -106,6 +106,11 @@ class Session:
         topics = (topic for monitor in self.monitors for topic in monitor.setup.filtered)
         self.behind_filters = {name: 0 for topic in topics for name in (topic, raw(topic))}
 
+    def prompt(self) -> None:
+        """Report breaches when they are seen, even if the end of the run may withdraw them."""
+        for monitor in self.monitors:
+            monitor.prompt = True
+
     def listens(self, topic: str) -> bool:
         return any(monitor.listens(topic) for monitor in self.monitors)
 

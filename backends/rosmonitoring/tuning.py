@@ -32,6 +32,10 @@ BREACHES_KEPT = 1_000
 BREACHES_OPEN = 100
 """Broken assumptions that wait for a verdict on the publisher: all are checked whenever a violation is reported."""
 
+BREACHES_IN_DOUBT = 10_000
+"""Breaches by order that wait for the end of the run, when the numbers of answers and inputs are compared: some 15 MB.
+Others are counted."""
+
 CANDIDATES_SHOWN = 12
 """Candidate fields that an error names; the user looks up a message with more anyway."""
 

@@ -1,4 +1,4 @@
-"""The steps of clauses that speak of other steps, if a stamp, key or call says which messages belong together.
+"""The steps of clauses that speak of other steps, if a stamp, key, call or order says which messages belong together.
 
 Each topic keeps the order of its publisher; there is no order between topics. So a step consists of the messages with
 one key on all topics of the clauses, inputs before outputs, and the steps have the order of the messages of each topic:
@@ -8,9 +8,11 @@ may have been a step that was not seen.
 
 from __future__ import annotations
 
+import math
 from collections import OrderedDict, deque
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
 from avow.formulas.formula import free_variables
@@ -66,11 +68,19 @@ class Word:
     """The topics of the clauses, and whether each carries outputs."""
     answered: OrderedDict[int, Mapping[str, tuple[int, ...]]] = field(default_factory=OrderedDict)
     """As `Pairing.answered`."""
+    uneven: str = ""
+    """By order: why the answers may be paired wrongly."""
+    counts: dict[str, int] = field(default_factory=dict)
+    """By order: the number of messages of each topic."""
+    lost: bool = False
+    """By order: as `Pairing.lost`."""
     _queues: dict[str, deque[Message]] = field(default_factory=dict)
     _where: dict[object, set[str]] = field(default_factory=dict)
     """For each key, the topics on which it waits."""
     _gone: OrderedDict[object, None] = field(default_factory=OrderedDict)
     """The latest keys that no longer wait, or came twice."""
+    _answer: Fraction | None = None
+    """By order: the time of the latest answer."""
 
     def __post_init__(self) -> None:
         self._queues = {topic: deque() for topic in self.topics}
@@ -94,7 +104,16 @@ class Word:
     def finish(self) -> Iterator[Step]:
         """The run is over. Inputs without an answer are in order among themselves."""
         left = {topic: queue for topic, queue in self._queues.items() if queue}
-        if not any(self.topics[topic] for topic in left):
+        if self.answers.by == "order":
+            answer = -math.inf if self._answer is None else self._answer
+            late = [t for t, q in left.items() if self.topics[t] or any(time_of(m.event) <= answer for m in q)]
+            counts = " and ".join(f"{self.counts.get(topic, 0)} of {topic}" for topic in self.topics)
+            self.uneven = (
+                f"messages: {counts}: which belong together is not told by their order (`answers: {{by: order}}`)"
+                if late
+                else ""
+            )
+        if not any(self.topics[topic] for topic in left) and not self.uneven:
             for key in [message.key for queue in left.values() for message in queue]:
                 if self._where.get(key, set()) >= {t for t, output in self.topics.items() if not output}:
                     yield from self._reach(key, left)
@@ -107,9 +126,15 @@ class Word:
         return any(queue and queue[0].index <= event for queue in self._queues.values())
 
     def _key(self, message: Message) -> object:
-        answers, output = self.answers, self.topics[message.topic]
-        key = Pairing.key(message.event, answers.output if output else answers.input)
-        return object() if key is None else key
+        topic, output = message.topic, self.topics[message.topic]
+        if self.answers.by != "order":
+            key = Pairing.key(message.event, self.answers.output if output else self.answers.input)
+            return object() if key is None else key
+        self.lost = self.lost or message.missed
+        self.counts[topic] = self.counts.get(topic, 0) + 1
+        if output:
+            self._answer = max(time_of(message.event), self._answer or Fraction(0))
+        return object() if self.lost else self.counts[topic]
 
     def _reach(self, key: object, topics: Mapping[str, object]) -> Iterator[Step]:
         """The step of a key, preceded by the messages that can no longer be part of a step."""
@@ -185,10 +210,10 @@ def word_of(setup: Setup, clauses: Iterable[Clause]) -> Word | None:
     told = [clause for clause in clauses if not untold(setup, clause)]
     if not any(histories(clause.formula) for clause in told):
         return None
-    return Word(setup.answers, _topics_of(setup, {v.qualified for c in told for v in free_variables(c.formula)}))
+    return Word(setup.answers, topics_of(setup, {v.qualified for c in told for v in free_variables(c.formula)}))
 
 
-def _topics_of(setup: Setup, names: Iterable[str]) -> dict[str, bool]:
+def topics_of(setup: Setup, names: Iterable[str]) -> dict[str, bool]:
     """The topics that carry the given variables, and whether these are outputs."""
     sources = [rule.source if isinstance(rule := setup.rules.get(name), Previous) else name for name in names]
     carried = setup.carried
@@ -213,7 +238,7 @@ def untold(setup: Setup, clause: Clause) -> str:
     names = setup.carried
     if not setup.shared.keys().isdisjoint(names):
         return "it speaks of other steps, and several nodes publish a topic: whose step a message is of is not told"
-    sides = [_topics_of(setup, [n for n in names if n.startswith(f"{Role.OUTPUT}.") is out]) for out in (False, True)]
+    sides = [topics_of(setup, [n for n in names if n.startswith(f"{Role.OUTPUT}.") is out]) for out in (False, True)]
     both = sorted(sides[0].keys() & sides[1].keys())
     return f"it speaks of other steps, and {both[0]} carries inputs and outputs" if both else ""
 

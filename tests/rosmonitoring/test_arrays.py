@@ -45,6 +45,7 @@ MAPPING = {
 ANSWERS: dict[str, dict[str, Any]] = {
     "arrival": {"by": "arrival", "because": "one process"},
     "stamp": {"by": "stamp"},
+    "order": {"by": "order", "because": "every link stood"},
     "latency": {"latency": "20 ms", "jitter": "5 ms", "because": "measured"},
 }
 NUMBERS = (0.1, 2.5, -3.0, 100.0)

@@ -67,6 +67,7 @@ MODES: dict[str, tuple[str, dict[str, Any]]] = {
     "arrival": ("", ARRIVAL),
     "memory": (MEMORY, ARRIVAL),
     "seconds": (SECONDS, ARRIVAL),
+    "order": ("", {"by": "order", "because": "every link stood"}),
     "key": ("", {"by": "key", "input": "id", "output": "id"}),
     "stamp": ("", {"by": "stamp"}),
     "latency": ("", {"latency": "10 ms", "jitter": "5 ms", "because": "as it is recorded"}),

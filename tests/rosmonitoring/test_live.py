@@ -204,7 +204,7 @@ def test_publishers_of_a_filtered_topic_have_one_type(master: Master) -> None:
     ("more", "why"),
     [
         ({}, "the plan filters nothing"),
-        ({"filter": ["out.s"], "answers": {"by": "stamp"}}, "shows only later"),
+        ({"filter": ["out.s"], "answers": {"by": "order", "because": "a test"}}, "shows only later"),
     ],
 )
 def test_what_cannot_be_filtered_is_refused(make_system: Callable[..., System], more: dict[str, Any], why: str) -> None:

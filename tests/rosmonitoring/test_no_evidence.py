@@ -204,9 +204,10 @@ def test_times_that_do_not_go_on_are_no_evidence_for_seconds(
 PAIRINGS: list[dict[str, Any]] = [
     {"by": "arrival", "because": "one process"},
     {"latency": "20 ms", "jitter": "5 ms", "because": "measured"},
-    {"by": "key", "input": "id", "output": "id"},
-    {"by": "stamp"},
-    {"by": "call"},
+    *(
+        {"by": by, **({"input": "id", "output": "id"} if by == "key" else {})}
+        for by in ("key", "stamp", "call", "order")
+    ),
 ]
 
 

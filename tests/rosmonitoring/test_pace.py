@@ -185,7 +185,7 @@ def test_losses_that_no_number_would_show_are_unknown(
 
 
 @pytest.mark.parametrize("seed", range(4))
-@pytest.mark.parametrize("by", ["key", "stamp", "latency"])
+@pytest.mark.parametrize("by", ["key", "stamp", "order", "latency"])
 def test_the_age_is_that_of_the_input_which_was_answered(
     by: str, seed: int, make_system: Callable[..., System]
 ) -> None:
@@ -196,6 +196,8 @@ def test_the_age_is_that_of_the_input_which_was_answered(
         answers = {"latency": "5 s", "jitter": "5 s", "because": "so"}
     heard = [Fraction(at) + Fraction(rng.randrange(10), 10) for at in range(0, 60, 2)]
     late = [at + Fraction(rng.randrange(1, 60), 10) for at in heard]
+    if by == "order":
+        late = sorted(late)
     events = [{"topic": "r", "time": float(at), "data": 1.0, "id": k} for k, at in enumerate(heard)]
     events += [{"topic": "s", "time": float(at), "data": 1.0, "id": k} for k, at in enumerate(late)]
     events.sort(key=lambda event: event["time"])

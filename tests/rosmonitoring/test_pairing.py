@@ -244,6 +244,84 @@ def test_the_command_says_what_was_not_monitored(make_system: Callable[..., Syst
     assert [*running.unmonitored()] == ["n.low", "n.high"]
 
 
+# -- by order ----------------------------------------------------------------------------------------------------------
+
+ORDER = {"by": "order", "because": "every link stood before the first message"}
+
+
+def shuffled(rng: random.Random, wrong: frozenset[int]) -> list[Event]:
+    """As `run`, with a recorder that may write an answer long before its input: each topic stays in its own order."""
+    events = run(rng, wrong)
+    queues = {topic: [e for e in events if e["topic"] == topic] for topic in ("r", "s")}
+    found: list[Event] = []
+    while any(queues.values()):
+        topic = rng.choice([name for name, left in queues.items() if left])
+        found.append({**queues[topic].pop(0), "time": len(found) / 10})
+    return found
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_the_kth_answer_is_held_against_the_kth_input(seed: int, make_system: Callable[..., System]) -> None:
+    rng = random.Random(seed)
+    wrong = frozenset(rng.sample(range(60), 3))
+    events = shuffled(rng, wrong)
+    violations, tallies = judge(make_system(RCL, MAPPING, answers=ORDER), events)
+    answers = [index for index, event in enumerate(events, start=1) if event["topic"] == "s"]
+    assert sorted({v.index for v in violations}) == [answers[k] for k in sorted(wrong)]
+    assert all(v.fault is Fault.GUARANTEE for v in violations)
+    assert all(tally.decided == 60 for name, tally in tallies.items() if name != "positive")
+
+
+MEMORY = """
+node n {
+  inputs( r : REAL, last : REAL )
+  outputs( s : REAL )
+  topics( std_msgs/Float64 r matches(in.r), std_msgs/Float64 s matches(out.s) )
+  guarantee same ( out.s == in.r or (in.last > 1000) )
+}
+"""
+
+
+@pytest.mark.parametrize("initial", [{}, {"initial": 0}])
+@pytest.mark.parametrize("seed", range(4))
+def test_an_answer_that_is_not_judged_is_counted(
+    seed: int, initial: dict[str, Any], make_system: Callable[..., System]
+) -> None:
+    """The first, where the step before is not known: the second is still the answer to the second input."""
+    rng = random.Random(seed)
+    values = [float(rng.randrange(900)) for _ in range(30)]
+    wrong = frozenset(rng.sample(range(1, 29), 3))
+    events: list[Event] = []
+    for k, value in enumerate(values):
+        pair = [("r", value), ("s", value + 0.5 * (k in wrong))]
+        for topic, told in reversed(pair) if k == 29 or rng.random() < 0.3 else pair:
+            events.append({"topic": topic, "time": len(events), "data": told})
+    mapping = {"in.r": "data", "out.s": "data", "in.last": {"previous": "out.s", **initial}}
+    violations, tallies = judge(make_system(MEMORY, mapping, answers=ORDER), events)
+    answers = [index for index, event in enumerate(events, start=1) if event["topic"] == "s"]
+    assert sorted(v.index for v in violations) == [answers[k] for k in sorted(wrong)]
+    assert tallies["same"].early == (not initial)
+
+
+@pytest.mark.parametrize(
+    ("lost", "topic", "fine"),
+    [(20, "r", False), (20, "s", False), (0, "r", False), (59, "r", False), (59, "s", True)],
+)
+def test_after_a_loss_order_tells_nothing(
+    lost: int, topic: str, fine: bool, make_system: Callable[..., System], tmp_path: Path
+) -> None:
+    """But for the last answer, which the recording may have ended before."""
+    events = [e for e in run(random.Random(1)) if (e["topic"], e["id"]) != (topic, lost)]
+    trace = tmp_path / "run.jsonl"
+    trace.write_text("".join(json.dumps(e) + "\n" for e in events), encoding="utf-8")
+    running = session(make_system(RCL, MAPPING, answers=ORDER), (), trace)
+    found = list(running.run(trace))
+    assert ([*running.unmonitored()] == []) is fine
+    assert found == []
+    if not fine:
+        assert "is not told by their order" in running.monitors[0].backwards
+
+
 @pytest.mark.parametrize(("again", "evidence"), [(5, True), (12, False)])
 def test_a_key_that_comes_again_with_another_value_once_it_was_answered_is_no_evidence(
     again: int, evidence: bool, make_system: Callable[..., System], tmp_path: Path

@@ -28,6 +28,7 @@ MESSAGES = {
 WAYS: dict[str, dict[str, Any]] = {
     "stamp": {"by": "stamp"},
     "key": {"by": "key", "input": "id", "output": "id"},
+    "order": {"by": "order", "because": "one process"},
     "latency": {"latency": "20 ms", "jitter": "0 ms", "because": "measured"},
     "arrival": {"by": "arrival", "because": "one process"},
 }
@@ -89,3 +90,22 @@ def test_a_wrong_answer_is_found_after_a_loss(make_system: Make, way: str, order
     assert (Fault.GUARANTEE, "same", event) in faults
     assert (Fault.GUARANTEE, "sum", event) in faults or way == "latency"
     assert {at for _, _, at in faults} == {event}
+
+
+@pytest.mark.parametrize("order", ["ab", "ba"])
+def test_by_order_an_unnumbered_loss_leaves_no_evidence(make_system: Make, order: str) -> None:
+    _, _, backwards = judged(make_system, "order", order, lost="b", seq=False)
+    assert "which are parts of one answer" in backwards or "is not told by their order" in backwards
+
+
+def test_by_order_a_message_that_cannot_be_read_is_the_kth(make_system: Make) -> None:
+    single = RCL.replace("outputs( a : REAL, b : REAL )", "outputs( a : REAL )").replace(", m/V b matches(out.b)", "")
+    rcl = single.replace("out.a + out.b == in.x", "2 * out.a == in.x").replace("guarantee same ( out.a == out.b )", "")
+    monitor = Monitor(found(make_system(rcl, {"in.x": "v", "out.a": "v"}, messages=MESSAGES, answers=WAYS["order"])))
+    told = []
+    for k in range(COUNT):
+        for topic, value in (("x", 2.0 * k), ("a", 1.0 * k)):
+            told += monitor.step({"topic": topic, "time": k * 1.0, "v": math.inf if k == AT else value})
+    told += monitor.finish()
+    assert {v.fault for v in told} == {Fault.MAPPING}
+    assert (monitor.tallies["sum"].decided, monitor.backwards) == (COUNT - 1, "")

@@ -20,6 +20,7 @@ node n {
 METHOD = "nodes: {n: {methods: [%s]}}"
 PLACES = [
     METHOD % "rosmonitoring: {answers: {by: arrival, because: {}}}",
+    METHOD % "rosmonitoring: {answers: {by: order, because: {}}}",
     METHOD % "rosmonitoring: {answers: {latency: 10 ms, jitter: 2 ms, because: {}}}",
     METHOD % "experiment: {data: d.csv, left_out: {runs: [1], because: {}}}",
     METHOD % "ajpf: {properties: {p: {psl: a, because: {}}}}",

@@ -36,6 +36,7 @@ def follow(
 ) -> Iterator[Violation]:  # fmt: skip
     """Judge the messages of a graph until it is `over`, and pass on those of filtered topics. Deadlines are by this
     machine's clock. Messages judged and recorded are marked `LIVE`. Raises Rejected if the record cannot be written."""
+    running.prompt()
     with ExitStack() as stack:
         try:
             file = stack.enter_context(record.open("w", encoding="utf-8")) if record is not None else None

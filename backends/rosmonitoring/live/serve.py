@@ -49,6 +49,7 @@ def serve(make: Callable[[], Session], port: int, ready: Callable[[Any], None] |
 
     def talk(connection: Any) -> None:
         session = make()
+        session.prompt()
         try:
             for frame in connection:
                 connection.send(answer(session, frame))
