@@ -343,18 +343,6 @@ def test_rml_engine_and_brute_force_agree(seed: int, make_system: Callable[..., 
     assert clean >= 2
 
 
-def test_most_of_these_formulas_are_monitorable_in_rml(make_system: Callable[..., System]) -> None:
-    rng = random.Random(99)
-    refused = []
-    for _ in range(30):
-        system = make_system(RCL.format(formula=formula(rng, 2)), MAPPING)
-        node = system.contract.node("n")
-        found, _ = setup(system, node, system.plan.node("n").methods[0].options)
-        refused += translate(found, node.guarantees).refused.values()
-    assert len(refused) < 15
-    assert all(reason.startswith("not monitorable in RML: ") for reason in refused)
-
-
 def test_the_interpreter_notices_a_changed_threshold(make_system: Callable[..., System]) -> None:
     """A control: a wrong translation does not pass the comparison."""
     system = make_system(RCL.format(formula="in.r < 2.5 -> out.flag"), MAPPING)

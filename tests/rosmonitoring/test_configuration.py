@@ -167,15 +167,6 @@ node n' {
 """
 
 
-def test_names_that_yaml_would_read_as_something_else(make_system: Callable[..., System]) -> None:
-    system = make_system(HOSTILE, {"in.x'": "data", "out.yes": "data"})
-    text, whole = configured(system, "n'")
-    assert problems(text) == []
-    monitor = whole["monitors"][0]["monitor"]
-    assert [t["name"] for t in monitor["topics"]] == ["off", "null"]
-    assert monitor["id"] == "monitor_n_x27_"
-
-
 def test_a_topic_of_the_plan_cannot_break_out(make_system: Callable[..., System]) -> None:
     topic = "x\"\n    oracle: {port: 1}\n#'"
     mapping = {"in.x'": {"topic": topic, "type": "a/R", "field": "data"}, "out.yes": "data"}

@@ -234,14 +234,6 @@ def pack(number: float) -> bytes:
     return struct.pack("<f", number)
 
 
-@pytest.mark.parametrize("distro", ["noetic", "humble", "jazzy"])
-def test_a_laser_scan_is_usable(make_system: Callable[..., System], distro: str) -> None:
-    pytest.importorskip("rosbags")
-    entry = {"field": "ranges", "take": "min", "nan": "none", "inf": "none", "elsewhere": 30}
-    system = system_of(make_system, "REAL", "sensor_msgs/LaserScan", entry, plan={"ros": {"distro": distro}})
-    assert value(system, ranges=[0.1, 3.5, math.inf]) == Fraction(struct.unpack("<f", pack(0.1))[0])
-
-
 @pytest.mark.parametrize(
     ("sort", "text", "hint"),
     [

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 from fractions import Fraction
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -77,43 +76,6 @@ def test_numbers_are_exact() -> None:
     for bad in (event["d"], float("nan"), float("inf"), True, "1", None, b"x"):
         with pytest.raises((NotANumber, ValueError)):
             exact(bad)
-
-
-def _write_bag(path: Path, version: int) -> None:
-    pytest.importorskip("rosbags")
-    from rosbags.typesys import Stores, get_typestore
-
-    if version == 1:
-        from rosbags.rosbag1 import Writer as Writer1
-
-        store = get_typestore(Stores.ROS1_NOETIC)
-        message_type: Any = store.types["std_msgs/msg/Float64"]
-        with Writer1(path) as writer:
-            connection = writer.add_connection("/r", "std_msgs/msg/Float64", typestore=store)
-            for k, value in enumerate((0.1, 130.0)):
-                data = store.serialize_ros1(message_type(data=value), "std_msgs/msg/Float64")
-                writer.write(connection, (k + 1) * 10**9, data)
-        return
-    from rosbags.rosbag2 import Writer as Writer2
-
-    store = get_typestore(Stores.ROS2_HUMBLE)
-    message_type = store.types["std_msgs/msg/Float64"]
-    with Writer2(path, version=8) as writer2:
-        connection2 = writer2.add_connection("/r", "std_msgs/msg/Float64", typestore=store)
-        for k, value in enumerate((0.1, 130.0)):
-            data = store.serialize_cdr(message_type(data=value), "std_msgs/msg/Float64")
-            writer2.write(connection2, (k + 1) * 10**9, data)
-
-
-@pytest.mark.parametrize("version", [1, 2])
-def test_bags(tmp_path: Path, version: int) -> None:
-    path = tmp_path / ("run.bag" if version == 1 else "run")
-    _write_bag(path, version)
-    found = list(read_trace(path))
-    assert [(r.event["topic"], exact(r.event["time"]), exact(r.event["data"])) for r in found] == [
-        ("/r", 1, Fraction(1, 10)),
-        ("/r", 2, 130),
-    ]
 
 
 def test_what_is_no_bag(tmp_path: Path) -> None:
