@@ -77,9 +77,9 @@ def _node(inputs: str = "", outputs: str = "b : BOOL", topics: str = "", clauses
 
 _FILE = (
     Code("RCL001", "no contract", "The file holds neither a context nor a node.", "// nothing yet"),
-    Code("RCL002", "unreadable file", "The file does not exist, is a folder, or may not be read."),
-    Code("RCL003", "file too large", "Contracts have at most 4 MB and a million words and signs."),
-    Code("RCL004", "not UTF-8", "Contracts are UTF-8; the place is the first byte that cannot be read."),
+    Code("RCL002", "unreadable file", "The file does not exist, is a folder, or is not readable."),
+    Code("RCL003", "file too large", "Contracts have at most 4 MB and a million tokens."),
+    Code("RCL004", "not UTF-8", "The place is the first byte that is not UTF-8."),
     Code("RCL005", "not a text", "The file holds a NUL character.", "node n\0"),
     Code(
         "RCL006",
@@ -98,7 +98,7 @@ _SYNTAX = (
     Code(
         "RCL101",
         "a sign of another notation",
-        "The sign is not RCL; the hint says what to write.",
+        "The hint has the RCL form.",
         "guarantee(in.level > 0 && out.status == low)",
     ),
     Code(
@@ -117,7 +117,7 @@ _SYNTAX = (
     Code(
         "RCL105",
         "no number",
-        "Numbers are whole (`12`) or decimal (`0.25`), without exponent; names begin with a letter.",
+        "Numbers are `12` or `0.25`, without exponent; names begin with a letter.",
         "guarantee(in.level < 1e6)",
     ),
     Code(
@@ -130,8 +130,8 @@ _SYNTAX = (
     Code(
         "RCL110",
         "nested too deeply",
-        "Formulas and types nest at most 150 levels deep; a constant or type has at most 20,000 parts, a "
-        "clause 200,000. Chains (`a and b and …`) are not nested.",
+        "Formulas and types nest at most 150 levels deep (chains such as `a and b and …` do not count); a "
+        "constant or type has at most 20,000 parts, a clause 200,000.",
         "guarantee(" + "(" * 200 + "TRUE" + ")" * 200 + ")",
     ),
     Code(
@@ -140,26 +140,26 @@ _SYNTAX = (
         "A file is one `context { … }` and any number of `node NAME { … }`.",
         "types { A : {a}; }",
     ),
-    Code("RCL112", "second context", "A file has one context at most.", "context { A : {a}; } context { B : {b}; }"),
-    Code("RCL113", "something else expected", "The message says what belongs here.", "node { }"),
+    Code("RCL112", "second context", "A file has at most one context.", "context { A : {a}; } context { B : {b}; }"),
+    Code("RCL113", "something else expected", "The message says what is expected.", "node { }"),
     Code("RCL114", "empty context", "A context declares at least one type or constant.", "context { }"),
     Code("RCL115", "bracket not closed", "A `(` or `{` has no partner.", "guarantee( (out.status == low )"),
     Code(
         "RCL116",
         "parts out of order",
-        "The parts of a node stand in this order: inputs, outputs, topics, assumptions, guarantees.",
+        "The order is: inputs, outputs, topics, assumptions, guarantees.",
         "guarantee(out.status == low) assume(in.level > 0)",
     ),
     Code(
         "RCL117",
         "part given twice",
-        "A node has one list of inputs, one of outputs, one of topics.",
+        "A node has one list each of inputs, outputs and topics.",
         _node() + _node(clauses="guarantee(out.b) inputs()").replace("node n", "node m"),
     ),
     Code(
         "RCL118",
         "part missing",
-        "A node has inputs, outputs and topics (each may be empty), and at least one guarantee.",
+        "A node has inputs, outputs and topics (possibly empty), and at least one guarantee.",
         "node n { outputs(b : BOOL) topics() guarantee(out.b) }",
     ),
     Code(
@@ -169,12 +169,15 @@ _SYNTAX = (
         "assume() guarantee(out.status == low)",
     ),
     Code(
-        "RCL120", "unexpected sign", "The formula, type or list cannot go on like this.", "guarantee(out.status = low)"
+        "RCL120",
+        "unexpected sign",
+        "The formula, type or list cannot continue like this.",
+        "guarantee(out.status = low)",
     ),
     Code(
         "RCL121",
         "no chain",
-        "Comparisons can be chained one way: `0 <= r < 120`. `!=` and `in` cannot be part of a chain.",
+        "Comparisons chain one way (`0 <= r < 120`), without `!=` and `in`.",
         "guarantee(0 <= in.level > 3)",
     ),
 )
@@ -184,7 +187,7 @@ _NAMES = (
     Code(
         "RCL202",
         "input or output?",
-        "A bare name must have one meaning.",
+        "A bare name is ambiguous here: write `in.v` or `out.v`.",
         _node("b : BOOL", clauses="guarantee(b)"),
     ),
     Code(
@@ -193,18 +196,18 @@ _NAMES = (
         "The node has no input or output of that name.",
         "guarantee(in.status == low)",
     ),
-    Code("RCL204", "not a value", "The name is that of a type or a node.", "guarantee(out.status == Status)"),
+    Code("RCL204", "not a value", "The name is a type or a node.", "guarantee(out.status == Status)"),
     Code(
         "RCL205",
         "another node's variable",
-        "A contract speaks of its own inputs and outputs only; `node.variable` belongs into plans.",
+        "A contract refers only to its own inputs and outputs; `node.variable` belongs into plans.",
         "guarantee(other.status == low)",
     ),
-    Code("RCL206", "no such node", "In a plan's formula, `node.variable` names a node that does not exist."),
+    Code("RCL206", "no such node", "A plan's formula names a node that does not exist."),
     Code(
         "RCL207",
         "name in use",
-        "A quantified variable hides nothing: its name must be new.",
+        "The name of a quantified variable must be new.",
         "guarantee(forall(level in REAL | level < 3))",
     ),
     Code("RCL208", "undeclared type", "The type is not declared.", _node("a : Colour")),
@@ -217,7 +220,7 @@ _NAMES = (
     Code(
         "RCL213",
         "shared element",
-        "Elements and constructors are global: two types cannot share one.",
+        "Two types must not share an element or constructor.",
         "context { A : {red, green}; B : {red, blue}; }",
     ),
     Code(
@@ -229,71 +232,71 @@ _NAMES = (
     Code(
         "RCL215",
         "clause name used twice",
-        "Each clause of a node has its own name; unnamed ones are called A1, A2, … and G1, G2, … by position.",
+        "Clauses of a node have different names; unnamed ones are called A1, A2, … and G1, G2, … by position.",
         _node(clauses="guarantee g (out.b) guarantee g (not out.b)"),
     ),
     Code(
         "RCL216",
         "topic listed twice",
-        "A node lists a topic once, or once for each variable that it carries, always with the same type.",
+        "A node lists a topic once, or once for each of its variables, with the same type.",
         _node(topics="bool t, bool t"),
     ),
     Code(
         "RCL217",
         "no ROS type or name",
-        "A topic has a built-in or package type of ROS, and a valid ROS name.",
+        "A topic needs a built-in or package type of ROS, and a valid ROS name.",
         _node(topics="Bool t"),
     ),
     Code(
         "RCL218",
         "matches nothing",
-        "A topic matches an input or output of its node.",
+        "A topic matches an input or output of its own node.",
         _node(topics="bool t matches(out.c)"),
     ),
     Code("RCL219", "node declared twice", "Nodes have different names.", _node() + _node()),
     Code(
         "RCL220",
         "quantified constant",
-        "A constant is a value; quantified formulas stand in clauses.",
+        "A constant is a value; quantified formulas belong in clauses.",
         "context { C = (exists(x in REAL | x > 0)); }",
     ),
 )
 
 _SORTS = (
-    Code("RCL301", "not a formula", "What stands here must be true or false.", "guarantee(in.count)"),
+    Code("RCL301", "not a formula", "A truth value is needed here.", "guarantee(in.count)"),
     Code(
         "RCL302",
         "different types",
-        "Only values of one type are compared or collected. INTEGER and NATURAL widen to REAL.",
+        "Only values of one type can be compared or collected. INTEGER and NATURAL widen to REAL.",
         "guarantee(out.status == in.level)",
     ),
-    Code("RCL303", "wrong type", "The place asks for another type.", "guarantee(in.marked(in.level))"),
+    Code("RCL303", "wrong type", "Another type is needed here.", "guarantee(in.marked(in.level))"),
     Code(
         "RCL304",
         "not a function",
-        "Only functions, constructors and sequences are applied.",
+        "Only functions, constructors and sequences can be applied.",
         "guarantee(out.status(3) == low)",
     ),
     Code(
         "RCL305",
         "wrong number of arguments",
-        "The function or constructor takes another number.",
+        "The function or constructor takes another number of arguments.",
         "guarantee(out.command == go(1))",
     ),
     Code("RCL306", "type cannot be told", "Nothing determines the type.", "guarantee(<> == <>)"),
-    Code("RCL307", "no set", "`in` asks about a set or a sequence.", "guarantee(in.level in REAL)"),
-    Code("RCL308", "no number", "Arithmetic and order are of numbers.", "guarantee(out.status < high)"),
+    Code("RCL307", "no set", "`in` needs a set or a sequence.", "guarantee(in.level in REAL)"),
+    Code("RCL308", "no number", "Arithmetic and order need numbers.", "guarantee(out.status < high)"),
     Code("RCL309", "division by zero", "The divisor is zero.", "guarantee(in.level / 0 > 1)"),
     Code(
         "RCL310",
         "quantified function",
-        "RCL is first-order: variables range over values.",
+        "Variables range over values, not functions.",
         "guarantee(exists(f in Marked | f(1)))",
     ),
     Code(
         "RCL311",
         "divisor not written down",
-        "`mod` and `div` divide by a positive whole number literal, so that they always have a value.",
+        "The divisor of `mod` and `div` is a positive whole number literal.",
         "guarantee(mod(in.count, in.count) == 0)",
     ),
     Code(
@@ -305,8 +308,7 @@ _SORTS = (
     Code(
         "RCL320",
         "length of time without a unit",
-        "A limit counts steps or time: `[5 steps]`, `[200 ms]`; a REAL expression is in seconds. Units are "
-        "ns, us, ms, s, min and h.",
+        "Write `[5 steps]`, `[200 ms]` (ns, us, ms, s, min, h), or a REAL expression in seconds.",
         "guarantee(held[5](in.level > 3) -> out.status == high)",
     ),
     Code(
@@ -319,7 +321,7 @@ _SORTS = (
     Code(
         "RCL322",
         "one step only",
-        "This formula is about one step; operators on other steps have no meaning in it.",
+        "This formula is about one step, so operators on other steps are not allowed.",
         "context { C = (once(1 > 0)); }",
     ),
     Code(
@@ -347,34 +349,34 @@ _LINTS = (
     _lint(
         "RCL401",
         "precedence without parentheses",
-        "Another bracketing would mean something else. The hint shows how the formula is read; add parentheses.",
+        "Another bracketing would mean something else. The hint shows the current reading; add parentheses.",
         "guarantee(in.level > 0 and in.count > 0 -> out.status == low)",
     ),
-    _lint("RCL402", "unused input", "No assumption or guarantee speaks of the input.", "guarantee(out.status == low)"),
+    _lint("RCL402", "unused input", "No assumption or guarantee refers to the input.", "guarantee(out.status == low)"),
     _lint(
         "RCL403",
         "unconstrained output",
-        "The node may emit anything there.",
+        "The node may output any value.",
         "guarantee(out.status == low)",
     ),
     _lint(
         "RCL404",
         "topic without variable",
-        "The topic matches no input or output, so no monitor can use it.",
+        "The topic matches no variable, so no monitor can use it.",
         _node(topics="bool t"),
     ),
     _lint("RCL405", "variable without topic", "No topic carries the variable, so no monitor can see it.", _node()),
     _lint(
         "RCL406",
         "two spellings",
-        "Two names differ by a letter or two; perhaps one thing is meant.",
+        "Two names differ by a letter or two and may mean the same.",
         _node(topics="nav_plugin/At b matches(out.b)")
         + _node(topics="nav_plugins/At b matches(out.b)").replace("node n", "node m"),
     ),
     _lint(
         "RCL407",
         "unused variable",
-        "The formula does not speak of the quantified variable.",
+        "The formula does not use the quantified variable.",
         "guarantee(forall(i in NATURAL | out.status == low))",
     ),
     _lint(
@@ -386,26 +388,26 @@ _LINTS = (
     _lint(
         "RCL409",
         "bare name in `matches`",
-        "Say whether the input or the output is meant: `matches(in.v)`.",
+        "Write `matches(in.v)` or `matches(out.v)`.",
         _node(topics="bool b matches(b)"),
     ),
     _lint(
         "RCL410",
         "nothing to allow",
-        "A comment `avow: allow` names something that is not the code of a lint.",
+        "The name after `avow: allow` is no code of a lint.",
         "// avow: allow RCL999\n  guarantee(out.status == low)",
     ),
     _lint(
         "RCL411",
         "variable on two topics",
-        "Two topics carry the variable, and a monitor reads it from one of them.",
+        "Two topics carry the variable; a monitor reads it from one of them.",
         _node(topics="bool t matches(out.b), bool u matches(out.b)"),
     ),
     _lint(
         "RCL412",
         "total function looked up by value",
-        "Every argument of a function has a value, so the function cannot say that some have none or that a "
-        "value is unique. A relation (`REAL x REAL x NATURAL --> BOOL`) can.",
+        "Every argument of a total function has a value. Use a relation (`REAL x REAL x NATURAL --> BOOL`) to "
+        "say that some have none, or that a value is unique.",
         _node(
             "number : REAL x REAL --> NATURAL, i : NATURAL",
             clauses="guarantee(out.b <=> exists(x, y in REAL | in.number(x, y) == in.i))",
@@ -414,7 +416,7 @@ _LINTS = (
     _lint(
         "RCL413",
         "sentence and formula compare otherwise",
-        "The formula compares with the sentence's number the other way, or has other numbers. Units (25 cm "
+        "Formula and sentence compare with a number in opposite ways, or have different numbers. Units (25 cm "
         "is 0.25) and conditions are considered.",
         'assume reading "The level is less than or equal to 0" (0 <= in.level) guarantee(out.status == low)',
     ),
@@ -433,21 +435,21 @@ _LINTS = (
     _lint(
         "RCL416",
         "assumption about an output",
-        "Assumptions are about inputs: no provider of inputs can establish what a node outputs.",
+        "No provider of inputs can establish what a node outputs. Write a guarantee.",
         "assume(out.status == low) guarantee(out.status != high)",
     ),
     _lint(
         "RCL417",
         "calculated position",
-        "Solvers rarely decide claims about elements such as `s(i + 1)`. Use two positions, `s(i)` and "
-        "`s(j)`, if only the order matters.",
+        "Solvers rarely decide claims about `s(i + 1)`. If only the order matters, use two positions, `s(i)` "
+        "and `s(j)`.",
         "node n { inputs(s : <REAL>) outputs(b : BOOL) topics() guarantee(b <=> forall(i in <1 upto length(s) - 1> | "
         "s(i - 1) <= s(i))) }",
     ),
     _lint(
         "RCL418",
         "unused definition",
-        "Nothing uses the definition, or the definition does not use its parameter.",
+        "Nothing uses the definition, or it does not use its parameter.",
         "node n { inputs(b : BOOL) outputs(c : BOOL) topics() define d = not in.b; guarantee(out.c <=> in.b) }",
     ),
 )

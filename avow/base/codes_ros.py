@@ -14,59 +14,59 @@ ROS_CODES = register(
     declare(
         "ROS102",
         "defined twice",
-        "Two files under `messages` define one message type, each otherwise.",
-        "Name one of the two.",
+        "Two files under `messages` define one message type differently.",
+        "Name one of them.",
     ),
     declare(
         "ROS104",
         "unknown message type",
         "A known package lacks this message type, `messages` lacks its package, or a service or action lacks its part.",
-        "Correct the type, or add its definition under `messages`; "
-        "write `package/Type_Request`, `_Response`, `_Goal`, `_Result` or `_Feedback`.",
+        "Correct the type, or add its definition under `messages`; parts are `package/Type_Request`, "
+        "`_Response`, `_Goal`, `_Result` and `_Feedback`.",
         warning=True,
     ),
     declare(
         "ROS111",
         "topic of two types",
-        "Publisher and subscriber of a topic have different message types, so ROS does not link them.",
-        "Give the topic one type, or remap one end under `ros`.",
+        "Publisher and subscriber of a topic have different message types.",
+        "Use one type, or remap one end under `ros`.",
     ),
     declare(
         "ROS112",
         "connection against the topics",
         "The plan connects ports whose topics differ at run time, or an output without a topic.",
-        "Give the remapping under `ros`, give the output its topic, or remove the connection.",
+        "Add the remapping under `ros` or the output's topic, or remove the connection.",
     ),
     declare(
         "ROS113",
         "one name, two topics",
         "An output and an input share a name but are on different topics.",
-        "Give the remapping under `ros` if they are one topic at run time.",
+        "If they are one topic at run time, add the remapping under `ros`.",
         warning=True,
     ),
     declare(
         "ROS114",
         "node hears itself",
-        "A node subscribes to a topic that it publishes, without an initial value.",
-        "Connect the two, delayed, with an initial value.",
+        "A node subscribes to its own topic without an initial value.",
+        "Add a delayed connection with an initial value.",
     ),
     declare(
         "ROS115",
         "which variable of the topic",
-        "A topic carries several variables, and names do not say which of them an input is.",
+        "A topic carries several variables, and no name says which one an input is.",
         "Give both ports one name, or connect them.",
     ),
     declare(
         "ROS116",
         "remapping the other way round",
-        "A remapping has its names the wrong way round.",
+        "A remapping seems reversed.",
         "Write the name in the node's code first, then the robot's.",
         warning=True,
     ),
     declare(
         "ROS120",
         "no launch file",
-        "A launch file is no XML, YAML or Python launch description. Avow never runs it.",
+        "A launch file is no XML, YAML or Python launch description.",
         "Correct the file.",
     ),
     declare(
@@ -80,18 +80,18 @@ ROS_CODES = register(
         "ROS122",
         "plan against launch file",
         "Plan and launch files name a node or topic differently.",
-        "Correct one of the two, or remove it from the plan.",
+        "Correct one of them, or remove it from the plan.",
     ),
     declare(
         "ROS123",
         "which started node",
-        "Several started nodes may be this node of the contract.",
+        "Several started nodes may be this node.",
         "Choose one under `ros: {nodes: {NODE: {name: /…}}}`, or give the launch file its `args`.",
     ),
     declare(
         "ROS124",
         "started and not modelled",
-        "The launch files start a node that the contract lacks, or do not start one that it has.",
+        "Launch files and contract have different nodes.",
         "Name it under `ros: {nodes: …}` or `model`, or add it to the contract.",
         warning=True,
     ),
@@ -99,7 +99,7 @@ ROS_CODES = register(
         "ROS125",
         "how a node runs",
         "The name and remappings with which the launch files start a node.",
-        "Check that they are the intended ones.",
+        "Check that they are intended.",
     ),
     declare(
         "ROS126",
@@ -110,8 +110,8 @@ ROS_CODES = register(
     declare(
         "ROS127",
         "other parameters",
-        "A launch file starts a node with parameters that differ from the plan's, so evidence about the "
-        "class does not apply to the robot.",
+        "A launch file starts a node with other parameters than the plan's, so evidence about the class does "
+        "not apply to the robot.",
         "Put the robot's parameters into the file under `source: {parameters: …}`.",
     ),
 )

@@ -18,7 +18,7 @@ WORKSPACE_CODES = register(
         "FRET001",
         "no FRETish file",
         "The file is neither text with one sentence per line nor FRET's JSON.",
-        "Export the requirements from FRET as JSON, or write the sentences into a text file.",
+        "Export JSON from FRET, or write the sentences into a text file.",
     ),
     declare(
         "FRET002",
@@ -29,37 +29,37 @@ WORKSPACE_CODES = register(
     declare(
         "FRET003",
         "no clause says the sentence",
-        "RCL cannot express a part of the sentence, which is left out; the message names it.",
+        "RCL cannot express the part of the sentence that the message names; the sentence is left out.",
         "Reword it in FRETish or write RCL.",
     ),
     declare(
         "FRET004",
         "FRET means something else than many expect",
-        "FRET's meaning of the sentence often differs from what was intended.",
+        "FRET's meaning of the sentence often differs from the intention.",
         "Read the message, and change the sentence if necessary.",
     ),
     declare(
         "FRET005",
         "no FRETish sentence says the clause",
-        "FRETish cannot express a part of the clause, which is left out; the message names it.",
+        "FRETish cannot express the part of the clause that the message names; the clause is left out.",
         "Reword it, or keep it in RCL.",
     ),
     declare(
         "PLAN090",
         "name taken",
         "A method has the name of one of Avow's own engines.",
-        "Give the method another `id`.",
+        "Choose another `id`.",
     ),
     declare(
         "BACKEND001",
         "two backends of one name",
-        "Two installed packages, or a package and a plugin of the plan, claim the same name.",
-        "Uninstall one of them, or rename the plugin's backend.",
+        "Two packages, or a package and a plugin, have the same backend name.",
+        "Uninstall or rename one.",
     ),
     declare(
         "BACKEND002",
         "no such backend",
-        "The plan names a backend that is not installed.",
+        "The backend is not installed.",
         "Correct the name, or name its module under `plugins`.",
     ),
     declare(
@@ -71,19 +71,19 @@ WORKSPACE_CODES = register(
     declare(
         "BACKEND004",
         "export leaves its folder",
-        "A backend writes a generated file outside its folder.",
+        "A backend writes a file outside its folder.",
         "Please report this defect of the backend.",
     ),
     declare(
         "BACKEND005",
         "plug-ins are not loaded here",
         "Plug-ins are code, and commands that only read run no code of a workspace.",
-        "`avow verify` loads them; see `docs/trust-model.md`.",
+        "Use `avow verify`; see `docs/trust-model.md`.",
     ),
     declare(
         "BACKEND006",
         "single steps only",
-        "The clause or an assumption refers to other steps, which the method cannot judge.",
+        "The method cannot judge clauses about other steps.",
         "Choose a method for runs, or remember the value in a port.",
     ),
     declare(
@@ -101,78 +101,76 @@ WORKSPACE_CODES = register(
     declare(
         "POLICY001",
         "no such profile",
-        "The plan names a policy profile that does not exist.",
-        "Use one of those listed in `docs/policy.md`.",
+        "There is no such policy profile.",
+        "Use a profile of `docs/policy.md`.",
     ),
     declare(
         "POLICY002",
         "wrong policy",
         "A part of the policy has the wrong form or an impossible demand.",
-        "Correct the place that the message names; see `docs/policy.md`.",
+        "Correct it; see `docs/policy.md`.",
     ),
-    declare(
-        "POLICY003", "unknown key", "The policy has no such key at this place.", "Use one of the keys in the message."
-    ),
+    declare("POLICY003", "unknown key", "The policy has no such key here.", "Use a key of the message."),
     declare(
         "REQS001",
         "unreadable requirements",
-        "The file of requirements cannot be read, is not UTF-8, or is no CSV.",
+        "The file cannot be read, is not UTF-8, or is no CSV.",
         "Give a CSV file with a header row, or ReqIF.",
     ),
     declare(
         "REQS002",
         "no requirements",
-        "The file has no rows, no column of requirement texts, or no specification objects.",
+        "The file has no rows, no column of texts, or no specification objects.",
         "Name the column, or export the requirements again.",
     ),
     declare(
         "REQS003",
         "not acceptable XML",
         "The ReqIF file is malformed, or declares a document type or entities.",
-        "Export it again, without a document type.",
+        "Export it again without them.",
     ),
     declare(
         "REQS004",
         "wrong requirement",
         "A requirement has no text, an invalid name, or the name of another.",
-        "Correct its row in the file.",
+        "Correct its row.",
     ),
     declare(
         "REQS005",
         "section does not read back",
-        "The plan's section would not read back as the same requirement; nothing is written.",
+        "The plan's section would read back differently, so nothing is written.",
         "Remove unusual characters from the text, and report the defect.",
     ),
     declare(
         "SMT001",
         "no SMT-LIB form",
-        "SMT-LIB cannot express a clause, which the translation leaves out.",
+        "SMT-LIB cannot express a clause, which is left out.",
         "Rewrite the clause if you need this form.",
         warning=True,
     ),
     declare(
         "LEDGER001",
         "unreadable ledger",
-        "The ledger's file exists but cannot be read.",
+        "The ledger cannot be read.",
         "Check the file's permissions.",
     ),
     declare(
         "LEDGER002",
         "no such obligation or evidence",
-        "Nothing in the reports has the name that was given.",
-        "Use a name from the hint, or the whole id that the report shows.",
+        "Nothing in the reports has this name.",
+        "Use a name of the hint, or the whole id that the report shows.",
     ),
     declare(
         "SIGN001",
         "key not made",
-        "The new key's file exists already, or cannot be written. A key is never overwritten.",
+        "The new key's file exists already, or cannot be written.",
         "Name a file that does not exist.",
     ),
     declare(
         "SIGN002",
         "nothing to sign",
         "The ledger is empty, or its chain is damaged.",
-        "Run `avow verify`, or look at the damage with `avow audit`.",
+        "Run `avow verify`, or `avow audit` to see the damage.",
     ),
     declare(
         "SIGN003",
@@ -183,13 +181,13 @@ WORKSPACE_CODES = register(
     declare(
         "SIGN004",
         "signing not installed",
-        "Signatures need a package that is not installed.",
+        "Signatures need a package.",
         "`pip install 'avow[signing]'`.",
     ),
     declare(
         "SIGN005",
         "who, until when",
-        "A signature needs a name and a day of the calendar that is not past.",
+        "A signature needs a name and a day that is not past.",
         'Give `--as "name, role" --until YYYY-MM-DD`.',
     ),
     declare(
@@ -201,7 +199,7 @@ WORKSPACE_CODES = register(
     declare(
         "REPORT001",
         "no report",
-        "There is no report.json where one is needed, or it cannot be read.",
+        "There is no readable report.json.",
         "Run `avow verify` first.",
     ),
     declare(
@@ -219,7 +217,7 @@ WORKSPACE_CODES = register(
     declare(
         "DIFF002",
         "no place for the page",
-        "Avow cannot write the page to the place of `--html`.",
+        "The file of `--html` cannot be written.",
         "Name a file in a writable folder.",
     ),
     declare(
@@ -228,38 +226,37 @@ WORKSPACE_CODES = register(
         "No folder here or above has both a `contracts/` and a `dodo.py`.",
         "Go to the workspace, or make one with `avow init DIR`.",
     ),
-    declare("CLI002", "no such system", "The workspace has no system of that name.", "Use a name from the hint."),
+    declare("CLI002", "no such system", "The workspace has no such system.", "Use a name of the hint."),
     declare(
         "CLI020",
         "systems of one name",
-        "Two folders under `contracts/` hold systems of one name.",
+        "Two folders under `contracts/` have systems of one name.",
         "Give each its own `system:` in plan.yaml; remove links to other systems' folders.",
     ),
     declare(
         "CLI021",
         "plan that is not verified",
         "`avow verify` skips a plan outside `contracts/NAME/` that no system includes, or a misnamed one (plan.yml).",
-        "Move its folder into `contracts/`, include it under `subsystems`, or switch the warning off by "
-        "`lints_off: [CLI021]`.",
+        "Move its folder into `contracts/`, include it under `subsystems`, or set `lints_off: [CLI021]`.",
     ),
     declare(
         "CLI022",
         "requirement that cannot be validated",
         "The plan has no such requirement, or Avow cannot edit its entry.",
-        "Use a name from the hint, and write the requirement in block style.",
+        "Use a name of the hint, and write the requirement in block style.",
     ),
     declare(
         "CLI023",
         "no PDF",
-        "Typst, which sets `report.pdf`, is not installed, or it fails.",
-        "`pip install typst`; every other format says the same.",
+        "Typst, which sets `report.pdf`, is missing or fails.",
+        "`pip install typst`; every other format has the same content.",
     ),
-    declare("CLI003", "no such node", "The contract has no node of that name.", "Use a name from the hint."),
-    declare("CLI005", "no such derivation", "The plan has no derivation of that name.", "Use a name from the hint."),
+    declare("CLI003", "no such node", "The contract has no such node.", "Use a name of the hint."),
+    declare("CLI005", "no such derivation", "The plan has no such derivation.", "Use a name of the hint."),
     declare(
         "CLUSTER001",
         "no cluster's address",
-        "A scheduler runs code of everyone who reaches it: only TLS, or this machine, is accepted.",
+        "Anyone who reaches a scheduler can run code: only TLS, or this machine, is accepted.",
         "Write `dask+tls://HOST:PORT`, or `dask+tcp://127.0.0.1:PORT`.",
     ),
     declare(
@@ -283,14 +280,14 @@ WORKSPACE_CODES = register(
     declare(
         "CLUSTER005",
         "certificate not accepted",
-        "A certificate has expired, is unreadable, or is of another authority than AVOW_TLS_CA.",
+        "A certificate is expired, unreadable, or of another authority than AVOW_TLS_CA.",
         "Have the authority issue a new one.",
     ),
     declare(
         "CLUSTER006",
         "worker left the cluster",
         "A worker cannot run jobs any more (full disk, upgraded Avow); others take over.",
-        "Repair it, and start it again.",
+        "Repair and restart it.",
     ),
     declare(
         "DRIVE100",
@@ -320,12 +317,12 @@ WORKSPACE_CODES = register(
         "DRIVE104",
         "no such messages",
         "The trace has no messages for the class, runs backwards, or has messages of another type.",
-        "Correct the trace, or name another.",
+        "Give another trace.",
     ),
     declare(
         "CLI006",
         "cannot be run",
-        "The scenario lacks something, such as an interpretation or a domain; the message names it.",
+        "The scenario lacks what the message names.",
         "Complete the plan's `scenario`.",
     ),
     declare(
@@ -334,11 +331,11 @@ WORKSPACE_CODES = register(
         "`avow init` writes only into a new or empty folder.",
         "Name another folder.",
     ),
-    declare("CLI010", "language server not installed", "`avow lsp` needs pygls.", "`pip install 'avow[lsp]'`."),
+    declare("CLI010", "language server not installed", "`avow lsp` needs a package.", "`pip install 'avow[lsp]'`."),
     declare(
         "CLI011",
         "nothing to draft from",
-        "Avow cannot read the given description, or it has no node with a topic.",
+        "The description cannot be read, or has no node with a topic.",
         "Give a bag, the output of `rosnode info` or `ros2 node info`, or a running master.",
     ),
 )
@@ -352,7 +349,7 @@ CORE_CODES: Mapping[str, Code] = register(
 def page_entry(code: Code) -> str:
     """A code in `docs/diagnostics.md`, with its example if that is short."""
     mark = "" if code.severity is Severity.ERROR else f" ({code.severity})"
-    lines = [f"**{code.code}{mark}, {code.title}.** {f'{code.explanation} {code.remedy}'.strip()}"]
-    if code.example and len(code.example) < 110 and "\0" not in code.example:
-        lines += ["", "```text", code.example, "```"]
-    return "\n".join(lines)
+    text = f"{code.explanation} {code.remedy}".strip()
+    shown = code.example if len(code.example) < 110 and "\0" not in code.example else ""
+    example = f"\n\n```text\n{shown}\n```" if "\n" in shown or "`" in shown else f" `{shown}`" if shown else ""
+    return f"**{code.code}{mark}, {code.title}.** {text}{example}"

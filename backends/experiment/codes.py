@@ -8,14 +8,14 @@ CODES = register(
     declare(
         "EXP101",
         "wrong option",
-        "An option is missing, unknown, or has a wrong value.",
-        "Write what the message wants; `docs/backends/experiment.md` has every option.",
+        "An option is missing, unknown, or wrong.",
+        "See `docs/backends/experiment.md`.",
     ),
-    declare("EXP102", "no data", "The file of runs does not exist or cannot be read.", "Correct the path."),
+    declare("EXP102", "no data", "The file of runs cannot be read.", "Correct the path."),
     declare(
         "EXP103",
         "wrong mapping",
-        "An entry of `mapping` names no port of the node or has a wrong type, or a port has no column.",
+        "An entry of `mapping` names no port or has a wrong type, or a port has no column.",
         "Name the column of each port that the guarantee refers to.",
     ),
     declare(
@@ -33,19 +33,19 @@ CODES = register(
     declare(
         "EXP111",
         "no table of runs",
-        "The file is no CSV in UTF-8 with a line of column names and at least one run.",
+        "The file is no CSV in UTF-8 with column names and a run.",
         "Export the data again.",
     ),
     declare(
         "EXP112",
         "wrong columns",
-        "A column that is needed is missing, occurs twice, or looks like another; or no column identifies a run.",
+        "A column is missing, repeated, or looks like another; or no column identifies a run.",
         "Correct the first line, or the columns that the options name.",
     ),
     declare(
         "EXP113",
         "wrong run",
-        "A row has too few or too many cells, a cell that is no value of its port, or the name of another run.",
+        "A row has a wrong number of cells, a cell that is no value of its port, or another run's name.",
         "Correct the line. Runs are never left out silently.",
     ),
 )

@@ -8,32 +8,32 @@ CODES = register(
     declare(
         "HOARE100",
         "not a program",
-        "Something else has to stand here, the layout is not consistent, or the program is nested too deeply.",
-        "Write what the hint wants; `docs/backends/hoare.md` has the language.",
+        "The program does not parse, its layout is inconsistent, or it is nested too deeply.",
+        "Write what the hint says; see `docs/backends/hoare.md`.",
     ),
     declare(
         "HOARE200",
         "wrong name",
-        "A name is unknown, declared twice, in use already, or belongs into formulas only.",
+        "A name is unknown, declared twice, in use, or allowed in formulas only.",
         "Declare it, or use another name.",
     ),
     declare(
         "HOARE300",
         "wrong type",
-        "An expression has another type than its place wants, or one that programs cannot compute.",
+        "An expression has the wrong type, or one that programs cannot compute.",
         "Correct the expression or the declaration.",
     ),
     declare(
         "HOARE400",
         "program and contract do not fit",
-        "The program's file is missing, or a port of the contract has no variable in the program.",
+        "The program's file is missing, or a port has no variable in the program.",
         "Map it under `variables`, or use a variable of that name.",
     ),
     declare(
         "HOARE410",
         "other numbers",
         "The program compares with other numbers than the contract.",
-        "Use the contract's numbers in the program. If the units differ, switch the warning off in the plan.",
+        "Use the contract's numbers. If the units differ, switch the warning off in the plan.",
         warning=True,
     ),
 )

@@ -8,33 +8,33 @@ CODES = register(
     declare(
         "HYPO100",
         "no subject",
-        "The option `subject` is missing and the node has no Python source, or it is not of the form file.py:function.",
+        "`subject` is missing and the node has no Python source, or it is not of the form file.py:function.",
         "Name the function to be tested.",
     ),
     declare(
         "HYPO101",
         "no such file",
-        "The subject's file is not in the system's folder.",
-        "Correct the path, which is relative to the system's folder.",
+        "The subject's file is missing.",
+        "Correct the path, relative to the system's folder.",
     ),
-    declare("HYPO102", "no such function", "The file defines no function of that name.", "Correct the name."),
+    declare("HYPO102", "no such function", "The file defines no such function.", "Correct the name."),
     declare(
         "HYPO103",
         "not Python",
-        "The subject's file cannot be read, or does not parse.",
+        "The file cannot be read, or does not parse.",
         "Correct it at the place named.",
     ),
     declare(
         "HYPO104",
         "arguments do not fit",
-        "The function wants an argument that is no input of the node, or is async.",
+        "An argument of the function is no input of the node, or the function is async.",
         "Name the arguments as the inputs; inputs may be left out.",
     ),
     declare(
         "HYPO106",
         "not for a class",
-        "A port has a type whose values a step class is not given, or the class computes with float32.",
-        "Give the node a function as `subject`, or another method.",
+        "A step class is given no values of a port's type, or the class computes with float32.",
+        "Give a function as `subject`, or use another method.",
     ),
     declare(
         "HYPO107",
@@ -45,7 +45,7 @@ CODES = register(
     declare(
         "HYPO105",
         "nested too deeply",
-        "A formula of the node is nested too deeply for a test to compute it.",
-        "Split the guarantee, or verify this node with another method.",
+        "A formula is nested too deeply for a test to compute it.",
+        "Split the guarantee, or use another method.",
     ),
 )

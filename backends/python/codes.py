@@ -8,14 +8,14 @@ CODES = register(
     declare(
         "PYTHON100",
         "no Python source",
-        "The node has no `source:` with a Python file and a class, or one of its files cannot be read.",
-        "Write `source: {python: src/node.py, class: Node}` for the node; `docs/plan.md` has the form.",
+        "The node has no `source:` with a Python file and a class, or a file of it cannot be read.",
+        "Write `source: {python: src/node.py, class: Node}`.",
     ),
     declare(
         "PYTHON200",
         "not in the subset",
-        "The file has something that this method does not understand: nothing is proved of it.",
-        "Write it as `docs/backends/python.md` has it, or give the node another method.",
+        "The file has something that this method does not understand, so nothing is proved.",
+        "Rewrite it (`docs/backends/python.md`), or use another method.",
         warning=True,
     ),
 )

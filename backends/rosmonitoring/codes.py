@@ -8,19 +8,19 @@ CODES = register(
     declare(
         "MON101",
         "wrong mapping",
-        "An entry of `mapping` does not say how an input or output is read from the messages of a topic.",
-        "Write what the message wants; `docs/backends/rosmonitoring.md` has the form.",
+        "An entry of `mapping` does not say how a variable is read from messages.",
+        "Write what the message says; see `docs/backends/rosmonitoring.md`.",
     ),
     declare(
         "MON102",
         "no such trace",
-        "A recorded trace is not in the system's folder.",
-        "Correct the path, which is relative to the system's folder.",
+        "A recorded trace is missing.",
+        "Correct the path, relative to the system's folder.",
     ),
     declare(
         "MON103",
         "cannot be monitored",
-        "The guarantee refers to something that no topic shows, or to other steps in a way that monitors do "
+        "No topic shows what the guarantee refers to, or it refers to other steps in a way that monitors do "
         "not support.",
         "Map it to a topic as the message says, or use another method.",
         warning=True,
@@ -28,14 +28,13 @@ CODES = register(
     declare(
         "MON105",
         "not in RML",
-        "The guarantee has no RML equivalent, or the plan does not say how its variables are read from messages.",
+        "The guarantee has no RML equivalent, or the plan does not map its variables.",
         "Map the variables that the message names (`docs/backends/rosmonitoring.md`); Avow's own engine judges more.",
     ),
     declare(
         "MON106",
         "number that the wire cannot hold",
-        "A clause compares a message's number for equality with a number that its type cannot hold, so they "
-        "are never equal.",
+        "A clause compares a message's number for equality with a number that its type cannot hold.",
         "Compare with a range, or with a number that the type can hold.",
         warning=True,
     ),
@@ -48,30 +47,28 @@ CODES = register(
     declare(
         "MON108",
         "no measurement",
-        "A table of what monitors cost (`overhead`) is not there, or holds something else.",
+        "A table under `overhead` is missing or wrong.",
         "Write a row for each run: which monitors ran, and the seconds until each place.",
     ),
-    declare("MON104", "no such node", "The system has no node of that name.", "Use the name from the hint."),
+    declare("MON104", "no such node", "The system has no such node.", "Use the name of the hint."),
     declare("MON201", "unreadable trace", "The trace's file cannot be read.", "Correct the path."),
-    declare(
-        "MON203", "not a bag", "The file is no ROS bag that can be read.", "Record it again, or export JSON lines."
-    ),
+    declare("MON203", "not a bag", "The file is no readable ROS bag.", "Record it again, or export JSON lines."),
     declare(
         "MON204",
         "wrong event",
-        "A line of the trace is too long, not UTF-8, no JSON object, or without a `time` in seconds from 0.",
+        "A line of the trace is too long, not UTF-8, no JSON object, or has no `time` in seconds from 0.",
         "Correct the line; none is left out silently.",
     ),
     declare(
         "MON205",
         "other messages",
-        "A bag's topic has another type than in the contract, or another definition of that type.",
-        "Correct the topic's type in the contract, or the definition that the plan names.",
+        "A bag's topic has another type than in the contract, or another definition of it.",
+        "Correct the type in the contract, or the definition that the plan names.",
     ),
     declare(
         "MON206",
         "calls not recorded",
-        "A clause refers to calls of a service, but a ROS 1 bag contains topics only.",
+        "A clause refers to calls of a service, but a ROS 1 bag has topics only.",
         "Use a ROS 2 bag with service events, a JSON trace, or a node that publishes its calls.",
     ),
     declare(
@@ -83,37 +80,37 @@ CODES = register(
     declare(
         "MON301",
         "serving not installed",
-        "Serving an oracle, listening to rosbridge, or writing an MCAP needs a package that is not installed.",
+        "Serving an oracle, listening to rosbridge, or writing an MCAP needs a package.",
         "`pip install 'avow[monitor]'`.",
     ),
     declare(
         "MON303",
         "no graph",
-        "No master of ROS 1 and no rosbridge answers, or it refuses; or a DDS domain cannot be joined.",
+        "No master of ROS 1 and no rosbridge answers, or a DDS domain cannot be joined.",
         "Start one (`roscore`), or name it: `--live ros1:http://host:11311`, `--live rosbridge:ws://host:9090`.",
     ),
     declare(
         "MON304",
         "cannot be written",
-        "A file that was to be written cannot be.",
+        "A file cannot be written.",
         "Correct the path of `--record`, `--timeline`, `--mcap` or `--configuration`.",
     ),
     declare(
         "MON305",
         "DDS not installed",
-        "Listening over DDS needs packages that are not installed.",
+        "Listening over DDS needs packages.",
         "`pip install 'avow[dds]'`.",
     ),
     declare(
         "MON306",
         "unknown type on DDS",
-        "DDS gives a topic's type name, but nothing defines its messages.",
+        "Nothing defines the messages of a type that DDS names.",
         "Name its `.msg` files under `messages`, or the distribution: `ros: {distro: humble}`.",
     ),
     declare(
         "MON307",
         "cannot be filtered",
-        "`--enforce` passes on a message once it is judged: of one topic of ROS 1, by itself, as it comes.",
+        "`--enforce` decides on each message alone, as it comes, on one topic of ROS 1.",
         "Name the outputs under `filter`; filter what one message decides.",
     ),
     declare("MON302", "cannot listen", "The port is taken or not allowed.", "Choose another with `--serve`."),

@@ -24,11 +24,10 @@ RANK = {"Severity.NOTE": 0, "Severity.WARNING": 1, "Severity.ERROR": 2}
 INTRO = f"""\
 # Diagnostics
 
-Every diagnostic has a code that keeps its meaning from version to version. `avow check --explain` prints what this page
-says of it. An error stops what it is about (exit code 2); a warning does not. The severity given is the greatest that
-the code can have.
+A code keeps its meaning from version to version. `avow check --explain` prints the entries of this page. An error stops
+the command with exit code 2; a warning does not. The severity given is the greatest that the code can have.
 
-An example of the language that is only a clause stands at the place of the `…` here:
+Code at the end of an entry is an example that triggers it. If it is only a clause, it belongs at the `…` of this text:
 
 ```text
 {FRAME.format(clause="…")}```
