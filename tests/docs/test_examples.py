@@ -139,6 +139,3 @@ def test_the_files_for_other_tools_are_well_formed() -> None:
         assert avow(words[1], "--help", cwd=ROOT).returncode == 0
     for path in (kit / "vscode").rglob("*.json"):
         json.loads(path.read_text())
-    page = (ROOT / "docs/adoption.md").read_text()
-    linked = [part.split(")")[0] for part in page.split("](")[1:]]
-    assert all((ROOT / "docs" / link).exists() for link in linked)
