@@ -347,9 +347,6 @@ CORE_CODES: Mapping[str, Code] = register(
 
 
 def page_entry(code: Code) -> str:
-    """A code in `docs/diagnostics.md`, with its example if that is short."""
+    """A code in `docs/diagnostics.md`."""
     mark = "" if code.severity is Severity.ERROR else f" ({code.severity})"
-    text = f"{code.explanation} {code.remedy}".strip()
-    shown = code.example if len(code.example) < 110 and "\0" not in code.example else ""
-    example = f"\n\n```text\n{shown}\n```" if "\n" in shown or "`" in shown else f" `{shown}`" if shown else ""
-    return f"**{code.code}{mark}, {code.title}.** {text}{example}"
+    return f"**{code.code}{mark}, {code.title}.** {code.explanation} {code.remedy}".strip()

@@ -12,7 +12,7 @@ import pytest
 from helpers import nodes, parsed
 
 from avow.backend_kit.registry import backend, names
-from avow.base.codes import CODES, FRAME, Code, declare, register
+from avow.base.codes import CODES, Code, declare, register
 from avow.base.codes_plan import PLAN_CODES
 from avow.base.codes_ros import ROS_CODES
 from avow.base.codes_workspace import CORE_CODES, WORKSPACE_CODES, page_entry
@@ -21,16 +21,11 @@ ROOT = Path(__file__).parents[2]
 PAGE = ROOT / "docs" / "diagnostics.md"
 FORM = re.compile(r"[A-Z]{2,}[0-9]{3}")
 RANK = {"Severity.NOTE": 0, "Severity.WARNING": 1, "Severity.ERROR": 2}
-INTRO = f"""\
+INTRO = """\
 # Diagnostics
 
 A code keeps its meaning from version to version. `avow check --explain` prints the entries of this page. An error stops
 the command with exit code 2; a warning does not. The severity given is the greatest that the code can have.
-
-Code at the end of an entry is an example that triggers it. If it is only a clause, it belongs at the `…` of this text:
-
-```text
-{FRAME.format(clause="…")}```
 """
 
 
