@@ -130,8 +130,8 @@ _SYNTAX = (
     Code(
         "RCL110",
         "nested too deeply",
-        "Formulas and types nest at most 150 levels deep (chains such as `a and b and …` do not count); a "
-        "constant or type has at most 20,000 parts, a clause 200,000.",
+        "Formulas and types nest at most 150 levels deep, except chains (`a and b and …`); a constant or type "
+        "has at most 20,000 parts, a clause 200,000.",
         "guarantee(" + "(" * 200 + "TRUE" + ")" * 200 + ")",
     ),
     Code(
@@ -200,7 +200,7 @@ _NAMES = (
     Code(
         "RCL205",
         "another node's variable",
-        "A contract refers only to its own inputs and outputs; `node.variable` belongs into plans.",
+        "A contract refers only to its own inputs and outputs.",
         "guarantee(other.status == low)",
     ),
     Code("RCL206", "no such node", "A plan's formula names a node that does not exist."),
@@ -314,8 +314,7 @@ _SORTS = (
     Code(
         "RCL321",
         "response in another place",
-        "`next`, `within`, `for`, `until` and `eventually` are the whole right side of a clause's outermost "
-        "`->`, or the whole clause.",
+        "A response is the whole right side of a clause's outermost `->`, or the whole clause.",
         "guarantee(next(out.status == high) and in.level > 3)",
     ),
     Code(
@@ -327,15 +326,14 @@ _SORTS = (
     Code(
         "RCL323",
         "wrong limit",
-        "`held`, `within` and `for` need a limit; `once`, `historically` and `since` may have one (`since` "
-        "with `<=`, `<`, `>=` or `>`).",
+        "`held`, `within` and `for` need a limit; `once`, `historically` and `since` may have one.",
         "guarantee(held(in.level > 3) -> out.status == high)",
     ),
     Code(
         "RCL324",
         "events and the time between steps",
         "`arrived` takes an input; `rose`, `fell` and `changed` take no formula with a limit in seconds; "
-        "`steps( … )` is a clause of its own.",
+        "`steps( … )` is a clause.",
         "guarantee(rose(once[2 s](in.level > 3)) -> out.status == high)",
     ),
 )
@@ -349,7 +347,7 @@ _LINTS = (
     _lint(
         "RCL401",
         "precedence without parentheses",
-        "Another bracketing would mean something else. The hint shows the current reading; add parentheses.",
+        "Another bracketing would mean something else. Add the parentheses of the hint.",
         "guarantee(in.level > 0 and in.count > 0 -> out.status == low)",
     ),
     _lint("RCL402", "unused input", "No assumption or guarantee refers to the input.", "guarantee(out.status == low)"),
@@ -406,8 +404,8 @@ _LINTS = (
     _lint(
         "RCL412",
         "total function looked up by value",
-        "Every argument of a total function has a value. Use a relation (`REAL x REAL x NATURAL --> BOOL`) to "
-        "say that some have none, or that a value is unique.",
+        "A total function has a value for all arguments. A relation (`… --> BOOL`) can say that some have "
+        "none, or that a value is unique.",
         _node(
             "number : REAL x REAL --> NATURAL, i : NATURAL",
             clauses="guarantee(out.b <=> exists(x, y in REAL | in.number(x, y) == in.i))",
@@ -416,8 +414,7 @@ _LINTS = (
     _lint(
         "RCL413",
         "sentence and formula compare otherwise",
-        "Formula and sentence compare with a number in opposite ways, or have different numbers. Units (25 cm "
-        "is 0.25) and conditions are considered.",
+        "Formula and sentence compare with a number in opposite ways, or have different numbers.",
         'assume reading "The level is less than or equal to 0" (0 <= in.level) guarantee(out.status == low)',
     ),
     _lint(
@@ -441,8 +438,8 @@ _LINTS = (
     _lint(
         "RCL417",
         "calculated position",
-        "Solvers rarely decide claims about `s(i + 1)`. If only the order matters, use two positions, `s(i)` "
-        "and `s(j)`.",
+        "Solvers rarely decide claims about `s(i + 1)`. Use two positions, `s(i)` and `s(j)`, if only the "
+        "order matters.",
         "node n { inputs(s : <REAL>) outputs(b : BOOL) topics() guarantee(b <=> forall(i in <1 upto length(s) - 1> | "
         "s(i - 1) <= s(i))) }",
     ),

@@ -9,7 +9,7 @@ ROS_CODES = register(
         "ROS101",
         "no message definition",
         "A file under `messages` defines no message type.",
-        "Write a `type name` on each line; separate the parts of services and actions by `---`.",
+        "Write a `type name` on each line.",
     ),
     declare(
         "ROS102",
@@ -20,9 +20,8 @@ ROS_CODES = register(
     declare(
         "ROS104",
         "unknown message type",
-        "A known package lacks this message type, `messages` lacks its package, or a service or action lacks its part.",
-        "Correct the type, or add its definition under `messages`; parts are `package/Type_Request`, "
-        "`_Response`, `_Goal`, `_Result` and `_Feedback`.",
+        "A message type, its package, or a part of a service or action is not defined.",
+        "Correct the type (`package/Type`, `package/Type_Request`, …), or add its definition under `messages`.",
         warning=True,
     ),
     declare(
@@ -41,7 +40,7 @@ ROS_CODES = register(
         "ROS113",
         "one name, two topics",
         "An output and an input share a name but are on different topics.",
-        "If they are one topic at run time, add the remapping under `ros`.",
+        "Add the remapping under `ros` if they are one topic.",
         warning=True,
     ),
     declare(
@@ -53,7 +52,7 @@ ROS_CODES = register(
     declare(
         "ROS115",
         "which variable of the topic",
-        "A topic carries several variables, and no name says which one an input is.",
+        "No name says which of a topic's variables an input is.",
         "Give both ports one name, or connect them.",
     ),
     declare(
@@ -72,7 +71,7 @@ ROS_CODES = register(
     declare(
         "ROS121",
         "launch file read in part",
-        "The launch file depends here on its environment: a variable, a command, a loop, a file outside the workspace.",
+        "The launch file depends here on something outside: a variable, a command, a loop, a file.",
         "Describe the node under `ros: {nodes: …}`, or give `args` for the launch file.",
         warning=True,
     ),
@@ -80,7 +79,7 @@ ROS_CODES = register(
         "ROS122",
         "plan against launch file",
         "Plan and launch files name a node or topic differently.",
-        "Correct one of them, or remove it from the plan.",
+        "Correct one of them.",
     ),
     declare(
         "ROS123",
@@ -105,13 +104,12 @@ ROS_CODES = register(
         "ROS126",
         "topics not known",
         "A launch file may remap this node's topics at a place that Avow cannot read.",
-        "Describe the node under `ros: {nodes: {NODE: {name: /…, remap: {…}}}}`.",
+        "Describe the node under `ros: {nodes: …}`.",
     ),
     declare(
         "ROS127",
         "other parameters",
-        "A launch file starts a node with other parameters than the plan's, so evidence about the class does "
-        "not apply to the robot.",
+        "A launch file and the plan start the node with different parameters.",
         "Put the robot's parameters into the file under `source: {parameters: …}`.",
     ),
 )

@@ -17,8 +17,8 @@ WORKSPACE_CODES = register(
     declare(
         "FRET001",
         "no FRETish file",
-        "The file is neither text with one sentence per line nor FRET's JSON.",
-        "Export JSON from FRET, or write the sentences into a text file.",
+        "The file is neither FRET's JSON nor text with one sentence per line.",
+        "Export JSON from FRET, or write such a text.",
     ),
     declare(
         "FRET002",
@@ -29,19 +29,19 @@ WORKSPACE_CODES = register(
     declare(
         "FRET003",
         "no clause says the sentence",
-        "RCL cannot express the part of the sentence that the message names; the sentence is left out.",
+        "RCL cannot express the named part of the sentence, which is left out.",
         "Reword it in FRETish or write RCL.",
     ),
     declare(
         "FRET004",
         "FRET means something else than many expect",
         "FRET's meaning of the sentence often differs from the intention.",
-        "Read the message, and change the sentence if necessary.",
+        "Change the sentence if necessary.",
     ),
     declare(
         "FRET005",
         "no FRETish sentence says the clause",
-        "FRETish cannot express the part of the clause that the message names; the clause is left out.",
+        "FRETish cannot express the named part of the clause, which is left out.",
         "Reword it, or keep it in RCL.",
     ),
     declare(
@@ -53,7 +53,7 @@ WORKSPACE_CODES = register(
     declare(
         "BACKEND001",
         "two backends of one name",
-        "Two packages, or a package and a plugin, have the same backend name.",
+        "Two backends have the same name.",
         "Uninstall or rename one.",
     ),
     declare(
@@ -66,18 +66,18 @@ WORKSPACE_CODES = register(
         "BACKEND003",
         "backend does not load",
         "The backend cannot be imported, or lacks a part of the protocol.",
-        "Repair it as the message says; see `docs/developers/adding-a-backend.md`.",
+        "Repair it (`docs/developers/adding-a-backend.md`).",
     ),
     declare(
         "BACKEND004",
         "export leaves its folder",
         "A backend writes a file outside its folder.",
-        "Please report this defect of the backend.",
+        "Please report this defect.",
     ),
     declare(
         "BACKEND005",
         "plug-ins are not loaded here",
-        "Plug-ins are code, and commands that only read run no code of a workspace.",
+        "Commands that only read run no plug-ins of a workspace.",
         "Use `avow verify`; see `docs/trust-model.md`.",
     ),
     declare(
@@ -90,13 +90,13 @@ WORKSPACE_CODES = register(
         "BACKEND007",
         "memory and invariant",
         "A program's state variable has a port's name, or an invariant refers to the next step.",
-        "Rename the variable; write the invariant about state and past.",
+        "Rename the variable, or correct the invariant.",
     ),
     declare(
         "BACKEND008",
         "backend failed",
         "The backend raised an exception outside of a run.",
-        "Please report this defect of the backend.",
+        "Please report this defect.",
     ),
     declare(
         "POLICY001",
@@ -139,7 +139,7 @@ WORKSPACE_CODES = register(
         "REQS005",
         "section does not read back",
         "The plan's section would read back differently, so nothing is written.",
-        "Remove unusual characters from the text, and report the defect.",
+        "Remove unusual characters, and report the defect.",
     ),
     declare(
         "SMT001",
@@ -211,8 +211,8 @@ WORKSPACE_CODES = register(
     declare(
         "DIFF001",
         "nothing to compare",
-        "The argument is no report, folder of reports, ledger, signature, workspace or git revision.",
-        "Give a `report.json`, a ledger, `signed`, the folder of another workspace, or a commit.",
+        "The argument cannot be compared.",
+        "Give a report, a ledger, `signed`, the folder of another workspace, or a git revision.",
     ),
     declare(
         "DIFF002",
@@ -231,19 +231,19 @@ WORKSPACE_CODES = register(
         "CLI020",
         "systems of one name",
         "Two folders under `contracts/` have systems of one name.",
-        "Give each its own `system:` in plan.yaml; remove links to other systems' folders.",
+        "Give each its own `system:` in plan.yaml.",
     ),
     declare(
         "CLI021",
         "plan that is not verified",
         "`avow verify` skips a plan outside `contracts/NAME/` that no system includes, or a misnamed one (plan.yml).",
-        "Move its folder into `contracts/`, include it under `subsystems`, or set `lints_off: [CLI021]`.",
+        "Move it, include it under `subsystems`, or set `lints_off: [CLI021]`.",
     ),
     declare(
         "CLI022",
         "requirement that cannot be validated",
         "The plan has no such requirement, or Avow cannot edit its entry.",
-        "Use a name of the hint, and write the requirement in block style.",
+        "Use a name of the hint, and block style.",
     ),
     declare(
         "CLI023",
@@ -293,7 +293,7 @@ WORKSPACE_CODES = register(
         "DRIVE100",
         "nothing to drive",
         "The plan declares no callback class for the node, or its file does not exist.",
-        "Write `source: {python: src/node.py, class: Node, kind: rospy}` (or `kind: rclpy`).",
+        "Write `source: {python: src/node.py, class: Node, kind: rospy}` (or `rclpy`).",
     ),
     declare(
         "DRIVE101",
@@ -304,14 +304,14 @@ WORKSPACE_CODES = register(
     declare(
         "DRIVE102",
         "topics do not fit",
-        "The class does not subscribe to or publish the contract's topics with their types.",
-        "Correct the contract's `topics`, the plan's `ros: {nodes: …}`, or the class.",
+        "The class does not use the contract's topics with their types.",
+        "Correct the contract's `topics`, the plan's `ros`, or the class.",
     ),
     declare(
         "DRIVE103",
         "cannot be driven",
         "The class uses a ROS interface that Avow does not drive, a clock, or chance.",
-        "Use ROS time (`rospy.Time.now()`, `get_clock().now()`) and a fixed seed.",
+        "Use ROS time and a fixed seed.",
     ),
     declare(
         "DRIVE104",
@@ -336,7 +336,7 @@ WORKSPACE_CODES = register(
         "CLI011",
         "nothing to draft from",
         "The description cannot be read, or has no node with a topic.",
-        "Give a bag, the output of `rosnode info` or `ros2 node info`, or a running master.",
+        "Give a bag, the output of `ros2 node info`, or a running master.",
     ),
 )
 

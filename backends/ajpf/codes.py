@@ -22,13 +22,13 @@ CODES = register(
         "AJPF103",
         "not supported",
         "An initial belief or goal has a variable, or a plan responds to any goal or belief.",
-        "Write the facts one by one, and a plan for each goal.",
+        "Write each fact, and a plan for each goal.",
     ),
     declare(
         "AJPF104",
         "name of the agent",
-        "AJPF's property language does not accept this agent's name, or two agents have it.",
-        "Choose another name that starts with a small letter and is no keyword of PSL.",
+        "AJPF does not accept this agent's name, or two agents have it.",
+        "Begin it with a small letter, and avoid keywords of PSL.",
     ),
     declare(
         "AJPF110",
@@ -46,7 +46,7 @@ CODES = register(
         "AJPF120",
         "no such file",
         "An option names a missing file.",
-        "Correct the path, relative to the system's folder.",
+        "Correct the path.",
     ),
     declare(
         "AJPF121",
@@ -95,14 +95,14 @@ CODES = register(
     declare(
         "AJPF132",
         "row that says nothing",
-        "The row's formula is true (or false) for every agent, so the part that it covers is assumed.",
+        "The row's formula is true (or false) for every agent.",
         "Correct the formula, or map the part to `T` deliberately.",
         warning=True,
     ),
     declare(
         "AJPF133",
         "instances left out",
-        "`instances` lack values of the scenario's domain, so the guarantee is not checked for these.",
+        "`instances` lack values of the scenario's domain, which are not checked.",
         "Leave the variable out of `instances`, or give the reason in the plan.",
         warning=True,
     ),
@@ -110,7 +110,7 @@ CODES = register(
         "AJPF134",
         "word that the agent lacks",
         "A row, property or environment names a belief, goal, action or percept that never occurs.",
-        "Correct its spelling, or the number of its arguments.",
+        "Correct its spelling or arguments.",
         warning=True,
     ),
 )

@@ -21,7 +21,7 @@ CODES = register(
         "DFY103",
         "what the proof leaves out",
         "The implementation assumes something, switches checks off, or clashes with the generated file.",
-        "Prove it; otherwise it becomes a hypothesis, or no proof is accepted.",
+        "Prove it; otherwise it becomes a hypothesis, or nothing is proved.",
         warning=True,
     ),
     declare(

@@ -16,19 +16,19 @@ CODES = register(
         "EXP103",
         "wrong mapping",
         "An entry of `mapping` names no port or has a wrong type, or a port has no column.",
-        "Name the column of each port that the guarantee refers to.",
+        "Name the column of each port of the guarantee.",
     ),
     declare(
         "EXP105",
         "claimed rate too low",
-        "The claimed success rate is below the minimum for the node's criticality.",
+        "The claimed success rate is too low for the node's criticality.",
         "Claim at least 0.9 at high, 0.8 at medium, 0.5 at low.",
     ),
     declare(
         "EXP106",
         "wrong interpretation",
         "An entry of `interpret` names no predicate of the node, or its meaning names no column.",
-        "Write `out.at(x, y)`, or a part of a guarantee, and a formula over columns.",
+        "Write a predicate and a formula over columns.",
     ),
     declare(
         "EXP111",
@@ -40,12 +40,12 @@ CODES = register(
         "EXP112",
         "wrong columns",
         "A column is missing, repeated, or looks like another; or no column identifies a run.",
-        "Correct the first line, or the columns that the options name.",
+        "Correct the first line, or the options.",
     ),
     declare(
         "EXP113",
         "wrong run",
         "A row has a wrong number of cells, a cell that is no value of its port, or another run's name.",
-        "Correct the line. Runs are never left out silently.",
+        "Correct the line.",
     ),
 )

@@ -8,19 +8,19 @@ CODES = register(
     declare(
         "FUZZ100",
         "no C++ source",
-        "The node has no `source:` with an adapter header, or a file of it cannot be read.",
-        "Write `source: {cpp: src/node_avow.hpp}`; `docs/backends/fuzz.md` shows a header.",
+        "The node has no `source:` with a readable adapter header.",
+        "Write `source: {cpp: src/node_avow.hpp}` (`docs/backends/fuzz.md`).",
     ),
     declare(
         "FUZZ101",
         "no such file or folder",
         "`sources` or `include` names a missing file or folder.",
-        "Correct the path, relative to the system's folder.",
+        "Correct the path.",
     ),
     declare(
         "FUZZ102",
         "no machine value",
         "A compiled step cannot take a port of this type, or `numbers: exact`.",
-        "Use REAL (float64 or float32), INTEGER, NATURAL, BOOL, enumerations and sequences of these.",
+        "Use numbers, BOOL, enumerations and sequences of these.",
     ),
 )

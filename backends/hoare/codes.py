@@ -27,13 +27,13 @@ CODES = register(
         "HOARE400",
         "program and contract do not fit",
         "The program's file is missing, or a port has no variable in the program.",
-        "Map it under `variables`, or use a variable of that name.",
+        "Map it under `variables`.",
     ),
     declare(
         "HOARE410",
         "other numbers",
         "The program compares with other numbers than the contract.",
-        "Use the contract's numbers. If the units differ, switch the warning off in the plan.",
+        "Correct the program, or switch the warning off if the units differ.",
         warning=True,
     ),
 )

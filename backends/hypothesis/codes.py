@@ -15,7 +15,7 @@ CODES = register(
         "HYPO101",
         "no such file",
         "The subject's file is missing.",
-        "Correct the path, relative to the system's folder.",
+        "Correct the path.",
     ),
     declare("HYPO102", "no such function", "The file defines no such function.", "Correct the name."),
     declare(
@@ -28,19 +28,19 @@ CODES = register(
         "HYPO104",
         "arguments do not fit",
         "An argument of the function is no input of the node, or the function is async.",
-        "Name the arguments as the inputs; inputs may be left out.",
+        "Name the arguments as the inputs.",
     ),
     declare(
         "HYPO106",
         "not for a class",
-        "A step class is given no values of a port's type, or the class computes with float32.",
+        "A step class takes no values of a port's type, or the class computes with float32.",
         "Give a function as `subject`, or use another method.",
     ),
     declare(
         "HYPO107",
         "callbacks cannot be judged",
-        "No installed method judges runs of messages, or the class subscribes to no topic of another node.",
-        "Install `rosmonitoring`, or let the class subscribe to the inputs.",
+        "No installed method judges runs of messages, or the class hears no topic of another node.",
+        "Install `rosmonitoring`, or subscribe to the inputs.",
     ),
     declare(
         "HYPO105",

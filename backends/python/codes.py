@@ -8,7 +8,7 @@ CODES = register(
     declare(
         "PYTHON100",
         "no Python source",
-        "The node has no `source:` with a Python file and a class, or a file of it cannot be read.",
+        "The node has no `source:` with a readable Python file and a class.",
         "Write `source: {python: src/node.py, class: Node}`.",
     ),
     declare(

@@ -16,12 +16,12 @@ CODES = register(
         "REV103",
         "another's review",
         "The record is of another node or system, or judges a guarantee that the node lacks.",
-        "Name this node's record, or correct the names in it.",
+        "Correct the names.",
     ),
     declare(
         "REV104",
         "signature does not count",
-        "The signature is missing, is for another text, or is by a key that the plan does not name.",
+        "The signature is missing, or is for another text or by another key than the plan's.",
         "The reviewer signs again: `avow review sign`.",
         warning=True,
     ),
@@ -34,8 +34,7 @@ CODES = register(
     declare(
         "REV112",
         "wrong date",
-        "A date is malformed, in the future, or before 2000; or the review expires, or was renewed, before it "
-        "was made.",
+        "A date is malformed, in the future, before 2000, or out of order.",
         "Write dates as 2026-11-21.",
     ),
     declare(
@@ -69,19 +68,19 @@ CODES = register(
         "REV120",
         "no review to fill in",
         "The system has no such node, or the plan has no or several reviews of it.",
-        "Name the node, and the method if there are several.",
+        "Name the node, and the method.",
     ),
     declare(
         "REV121",
         "changed since it was reviewed",
-        "A file or guarantee has changed since the review; its digest is not replaced silently.",
+        "A file or guarantee has changed since the review.",
         "Review it again, and stamp with `--renewed DATE`.",
     ),
     declare(
         "REV122",
         "stamp does not read back",
         "The stamped record would have another meaning, so the file is unchanged.",
-        "Write the entry that the message names in the plain form of `docs/backends/review.md`, then stamp again.",
+        "Write the named entry as in `docs/backends/review.md`, then stamp again.",
     ),
     declare(
         "REV123",

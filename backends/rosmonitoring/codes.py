@@ -15,27 +15,26 @@ CODES = register(
         "MON102",
         "no such trace",
         "A recorded trace is missing.",
-        "Correct the path, relative to the system's folder.",
+        "Correct the path.",
     ),
     declare(
         "MON103",
         "cannot be monitored",
-        "No topic shows what the guarantee refers to, or it refers to other steps in a way that monitors do "
-        "not support.",
-        "Map it to a topic as the message says, or use another method.",
+        "No topic shows what the guarantee refers to, or monitors do not support its operators.",
+        "Map it to a topic, or use another method.",
         warning=True,
     ),
     declare(
         "MON105",
         "not in RML",
         "The guarantee has no RML equivalent, or the plan does not map its variables.",
-        "Map the variables that the message names (`docs/backends/rosmonitoring.md`); Avow's own engine judges more.",
+        "Map the named variables, or use Avow's own engine.",
     ),
     declare(
         "MON106",
         "number that the wire cannot hold",
         "A clause compares a message's number for equality with a number that its type cannot hold.",
-        "Compare with a range, or with a number that the type can hold.",
+        "Compare with a range.",
         warning=True,
     ),
     declare(
@@ -57,7 +56,7 @@ CODES = register(
         "MON204",
         "wrong event",
         "A line of the trace is too long, not UTF-8, no JSON object, or has no `time` in seconds from 0.",
-        "Correct the line; none is left out silently.",
+        "Correct the line.",
     ),
     declare(
         "MON205",
@@ -69,13 +68,13 @@ CODES = register(
         "MON206",
         "calls not recorded",
         "A clause refers to calls of a service, but a ROS 1 bag has topics only.",
-        "Use a ROS 2 bag with service events, a JSON trace, or a node that publishes its calls.",
+        "Use a ROS 2 bag with service events, or a JSON trace.",
     ),
     declare(
         "MON207",
         "unknown publisher",
         "Nodes outside the contract publish on one of its topics in the bag.",
-        "Add them to the contract, give the node's name at run time (`ros: {nodes: …}`), or record without them.",
+        "Add them to the contract, or give the node's name at run time (`ros: {nodes: …}`).",
     ),
     declare(
         "MON301",
@@ -86,8 +85,8 @@ CODES = register(
     declare(
         "MON303",
         "no graph",
-        "No master of ROS 1 and no rosbridge answers, or a DDS domain cannot be joined.",
-        "Start one (`roscore`), or name it: `--live ros1:http://host:11311`, `--live rosbridge:ws://host:9090`.",
+        "No ROS 1 master, rosbridge or DDS domain can be reached.",
+        "Start one (`roscore`), or name it: `--live ros1:http://host:11311`.",
     ),
     declare(
         "MON304",
@@ -110,8 +109,8 @@ CODES = register(
     declare(
         "MON307",
         "cannot be filtered",
-        "`--enforce` decides on each message alone, as it comes, on one topic of ROS 1.",
-        "Name the outputs under `filter`; filter what one message decides.",
+        "`--enforce` decides on each message alone, on one topic of ROS 1.",
+        "Name outputs under `filter` that one message decides.",
     ),
     declare("MON302", "cannot listen", "The port is taken or not allowed.", "Choose another with `--serve`."),
 )
