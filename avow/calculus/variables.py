@@ -7,9 +7,9 @@ read it.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import field, replace
-from fractions import Fraction
+from functools import partial
 from typing import TypeVar
 
 from avow.base.files import sha256
@@ -17,12 +17,12 @@ from avow.base.records import dataclass
 from avow.formulas.formula import digest, free_variables, substitute
 from avow.formulas.temporal.ages import CLOCK
 from avow.formulas.temporal.cell import CELL, Cell, Unsaid
-from avow.formulas.temporal.cells import Records, compile_node, remembers
-from avow.formulas.temporal.clock import GOES_ON, Timed, compile_timed, events, is_arrival, longest_limit, one_pace
+from avow.formulas.temporal.cells import Records, compiled, remembers
+from avow.formulas.temporal.clock import GOES_ON, Timed, events, is_arrival, longest_limit, one_pace, other_paces
 from avow.language.contract import Clause, ClauseKind, Node, Port
 from avow.language.printer import show_sort
 from avow.language.sorts import BOOL, REAL, Sort
-from avow.language.subterms import histories, ports_of, timed
+from avow.language.subterms import counts_steps, histories, ports_of, timed
 from avow.language.terms import TRUE, Role, Term, Variable
 from avow.system.folding import own_inputs
 from avow.system.formulas import Assumed, environment_assumptions, initial_condition
@@ -373,14 +373,16 @@ def framed(system: System, graph: Graph, assumed: Sequence[Assumed], required: M
     speaking = {name: term for name, term in required.items() if histories(term)}
     clauses = (c.formula for n in system.contract.nodes for c in n.clauses)
     longest = longest_limit((*clauses, *(a.formula for a in assumed), *speaking.values()))
+    others, apart = other_paces(system.contract.nodes)
     together = one_pace(system.contract.nodes)
+    fresh = partial(Timed, longest=longest, apart=apart) if together else partial(Records, apart=apart)
     nodes: dict[str, Node] = {}
     cells: dict[str, tuple[Cell, ...]] = {}
     given: list[Assumed] = []
     left_out: list[str] = []
     for node in system.contract.nodes:
         own = [a for a in assumed if a.node == node.name]
-        nodes[node.name], cells[node.name], said = _of_one_step(node, own, longest, together=together)
+        nodes[node.name], cells[node.name], said = _of_one_step(node, own, fresh, paced=node.name not in others)
         left_out += [
             f"{node.name}.{g.name}"
             for g in node.guarantees
@@ -390,7 +392,7 @@ def framed(system: System, graph: Graph, assumed: Sequence[Assumed], required: M
         given += said
     given.sort(key=lambda a: [each.port for each in assumed].index(a.port))
     constants = frozenset(entry.port for entry in system.plan.environment if entry.constant)
-    observed = {name: observing(name, term, longest, together=together) for name, term in speaking.items()}
+    observed = {name: observing(name, term, fresh()) for name, term in speaking.items()}
     remembering = {name: kept for name, kept in cells.items() if kept}
     own_names = own_inputs(system, graph)
     made = Frame(
@@ -402,32 +404,33 @@ def framed(system: System, graph: Graph, assumed: Sequence[Assumed], required: M
 
 
 def _unsaid(clause: Term, said: Term) -> bool:
-    """Whether a clause with limits in seconds has no formula over one step. (No first steps violate `eventually`.)"""
-    return said == TRUE and timed(clause) is not None
+    """Whether a clause with a limit or a count has no formula over one step. (No first steps violate `eventually`.)"""
+    return said == TRUE and (timed(clause) is not None or counts_steps(clause))
 
 
 def _of_one_step(
-    node: Node, assumed: Sequence[Assumed], longest: Fraction | None, *, together: bool
+    node: Node, assumed: Sequence[Assumed], fresh: Callable[[], Records], *, paced: bool
 ) -> tuple[Node, tuple[Cell, ...], list[Assumed]]:
-    """The node with clauses over one step, its cells, and the plan's assumptions on its inputs, also over one step."""
+    """The node with clauses over one step, its cells, and the plan's assumptions on its inputs, also over one step.
+    `paced`: its pace is a hypothesis."""
     if not remembers(node) and not any(histories(a.formula) for a in assumed):
         return node, (), list(assumed)
     supposed = tuple(Clause(ClauseKind.ASSUMPTION, f"{a.port}{CELL}", 0, a.formula) for a in assumed)
     whole = replace(node, assumptions=(*node.assumptions, *supposed))
-    made = compile_timed(whole, longest) if together else compile_node(whole)
+    made = compiled(whole, fresh())
     read = (*made.before, *events(made))
     ports = tuple(Port(Role.INPUT, v.name, v.sort, show_sort(v.sort)) for v in read)
     # a clause without a formula over one step is no hypothesis; such an assumption of a node stays, and open
     said = {c.name: TRUE if c.name in made.unsaid else c.formula for c in made.node.clauses}
+    said |= {g.name: TRUE for g in node.guarantees if g.pace is not None and not paced}
     kept = tuple(replace(g, formula=said[g.name]) for g in made.node.guarantees)
     known = made.node.assumptions[: len(node.assumptions)]
     given = [replace(a, formula=said[each.name]) for a, each in zip(assumed, supposed, strict=True)]
     return replace(node, inputs=(*node.inputs, *ports), assumptions=known, guarantees=kept), made.cells, given
 
 
-def observing(name: str, formula: Term, longest: Fraction | None, *, together: bool) -> Observed:
-    """A requirement that mentions other steps, as a formula over one step. `together`: all nodes share one clock."""
-    records = Timed(longest=longest) if together else Records()
+def observing(name: str, formula: Term, records: Records) -> Observed:
+    """A requirement that mentions other steps, as a formula over one step."""
     try:
         said = records.clause(formula)
     except Unsaid as why:

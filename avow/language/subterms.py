@@ -7,7 +7,7 @@ from typing import TypeVar
 
 from avow.base.remembered import by_identity
 from avow.language.sorts import Sort, parts
-from avow.language.terms import History, Role, Term, Variable
+from avow.language.terms import History, Past, Role, Term, Variable
 
 
 def subterms(term: Term) -> Iterator[Term]:
@@ -28,6 +28,12 @@ def histories(term: Term) -> tuple[History, ...]:
 def timed(term: Term) -> History | None:
     """A subterm with a limit in seconds, so that the time between steps matters; None if there is none."""
     return next((part for part in histories(term) if part.limit is not None and not part.limit.steps), None)
+
+
+def counts_steps(term: Term) -> bool:
+    """Whether the number of steps matters: `previous`, `next`, `counted`, or a limit in steps."""
+    counting = (Past.PREVIOUS, Past.NEXT, Past.COUNTED)
+    return any(h.operator in counting or (h.limit is not None and h.limit.steps) for h in histories(term))
 
 
 def ports_of(term: Term) -> tuple[Variable, ...]:

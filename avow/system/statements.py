@@ -20,7 +20,7 @@ GENERAL = {
     "assumptions.samples.representative": "Cases that were not tried are like those that were",
     "assumptions.samples.recordings": "What is recorded is what the programs and settings of today do",
     "assumptions.platform.start": "Each delayed input begins with the first value that the plan gives",
-    "assumptions.platform.reaction": "Each node answers in time, and a reaction takes no time between nodes",
+    "assumptions.platform.reaction": "All nodes step together: each answers in time, and a reaction takes no time",
     "assumptions.tools.trusted": "The tools that answered, and the trusted base, answer rightly",
 }
 """The basis of any evidence of a kind: the place of the plan where a person answers for it, and its words."""

@@ -132,7 +132,9 @@ def test_a_requirement_over_several_nodes_rests_on_answers_in_time(
     whole = system({"n": ["g"], "m": ["g"]}, plans=plans, requirements=[requirement])
     found = case(whole, [*goals, *([asked] if formula else [])], [proof] if formula else [])
     about = [a for a in found.assumptions if a.key == "assumptions.platform.reaction"]
-    assert [a.words for a in about] == ["Each node answers in time, and a reaction takes no time between nodes"] * named
+    assert [a.words for a in about] == [
+        "All nodes step together: each answers in time, and a reaction takes no time"
+    ] * named
     assert all(a.needed_by == ("R",) and a.sort == "the platform" for a in about)
 
 

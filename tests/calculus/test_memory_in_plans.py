@@ -202,3 +202,33 @@ def test_a_run_over_the_scenario_keeps_to_no_clause_that_is_left_out(tmp_path: P
     found = outcomes(make(tmp_path, LEFT_OUT, plan))["R"]
     assert found.verdict is Verdict.UNKNOWN, found.summary
     assert "a.held" in found.summary
+
+
+PULSE = "node a { inputs( u : BOOL ) outputs( v : BOOL ) topics() steps( %s ) guarantee g ( out.v <=> rose(in.u) ) }\n"
+SLOW = "node b { inputs( v : BOOL ) outputs( w : BOOL ) topics() %s guarantee h ( in.v -> within[3 steps](out.w) ) }\n"
+CLOCK = "node clock { inputs( r : BOOL ) outputs( s : BOOL ) topics() steps( at most 10 ms ) guarantee g ( out.s ) }\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "formula", "verdict"),
+    [
+        (PULSE % "at most 100 ms" + SLOW % "steps( at most 1 s )", "a.v -> within[300 ms](b.w)", Verdict.UNKNOWN),
+        (PULSE % "at most 100 ms" + SLOW % "steps( at most 1 s )", "a.v -> within[3 s](b.w)", Verdict.PROVED),
+        (PULSE % "at most 100 ms" + SLOW % "", "a.v -> within[300 ms](b.w)", Verdict.UNKNOWN),
+        (PULSE % "at most 100 ms" + SLOW % "steps( at most 100 ms )", "a.v -> within[300 ms](b.w)", Verdict.PROVED),
+        (CLOCK + SLOW % "", "b.v -> within[30 ms](b.w)", Verdict.UNKNOWN),
+        (CLOCK + SLOW % "", "b.v -> within[3 steps](b.w)", Verdict.PROVED),
+    ],
+)
+def test_one_nodes_pace_bounds_no_step_that_another_counts(
+    tmp_path: Path, text: str, formula: str, verdict: Verdict
+) -> None:
+    found = required(tmp_path, text, formula)
+    assert found.verdict is verdict, found.summary
+
+
+def test_where_paces_differ_no_number_of_steps_is_a_number_of_all_nodes_steps(tmp_path: Path) -> None:
+    text = PULSE % "every 100 ms" + SLOW % "steps( every 1 s )"
+    found = required(tmp_path, text, "a.v -> within[3 steps](b.w)")
+    assert found.verdict is Verdict.UNKNOWN
+    assert "a and b declare different `steps(…)`" in found.summary

@@ -19,7 +19,7 @@ from avow.language import terms as t
 from avow.language.contract import Clause, Node
 from avow.language.definedness import defined
 from avow.language.sorts import BOOL, INTEGER, NATURAL, Sort
-from avow.language.subterms import histories
+from avow.language.subterms import counts_steps, histories
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,12 +69,16 @@ def compiled(node: Node, records: Records) -> Remembering:
 class Records:
     """The cells of some formulas, made on demand."""
 
+    apart: str = ""
+    """Why limits in steps have no common meaning, if they have none."""
     cells: list[Cell] = field(default_factory=list)
     _values: dict[str, t.Term] = field(default_factory=dict)
     _first: Cell | None = None
 
     def clause(self, formula: t.Term) -> t.Term:
         """A clause, which may be a response, as a formula of one step. Raises Unsaid without having made a cell."""
+        if self.apart and counts_steps(formula):
+            raise Unsaid(self.apart)
         with self._undone():
             return self.term(in_the_past(formula))
 

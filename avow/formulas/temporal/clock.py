@@ -12,7 +12,7 @@ silence before it only at these instants and between them: no formula of a step 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import field, replace
 from fractions import Fraction
@@ -39,17 +39,11 @@ from avow.formulas.temporal.responses import in_the_past
 from avow.language import terms as t
 from avow.language.contract import Clause, ClauseKind, Node, Port
 from avow.language.sorts import BOOL, REAL
-from avow.language.subterms import histories, timed
+from avow.language.subterms import counts_steps, histories, timed
 
 _EVER = (t.Past.ONCE, t.Past.HISTORICALLY, t.Past.SINCE)
 GOES_ON = t.Compare("<", NO_TIME, CLOCK)
 """Time passes from step to step."""
-
-
-def compile_timed(node: Node, longest: Fraction | None = None) -> Remembering:
-    """As `compile_node`, also for clauses with limits in seconds: they read `CLOCK` (and so do cells). `longest`: timer
-    values above it are not distinguished; needed if other clauses than this node's matter."""
-    return compiled(node, Timed(longest=longest or longest_limit(c.formula for c in node.clauses)))
 
 
 def longest_limit(formulas: Iterable[t.Term]) -> Fraction | None:
@@ -86,11 +80,12 @@ def pace_of(node: Node) -> t.Limit | None:
 
 
 def one_step(node: Node) -> Remembering:
-    """As `compile_timed`, with the other variables that a step reads as inputs of the node, and the constraints on the
-    time between steps as assumptions, since the environment determines it."""
+    """As `compile_node`, also with limits in seconds. Other variables that a step reads are inputs of the node, and the
+    constraints on the time between steps are assumptions, since the environment determines it."""
     paced = tuple(replace(c, kind=ClauseKind.ASSUMPTION) for c in node.guarantees if c.pace is not None)
     others = tuple(c for c in node.guarantees if c.pace is None)
-    made = compile_timed(replace(node, assumptions=(*node.assumptions, *paced), guarantees=others))
+    longest = longest_limit(clause.formula for clause in node.clauses)
+    made = compiled(replace(node, assumptions=(*node.assumptions, *paced), guarantees=others), Timed(longest=longest))
     read = events(made)
     ports = tuple(Port(t.Role.INPUT, v.name, v.sort, str(v.sort)) for v in read)
     goes_on = Clause(ClauseKind.ASSUMPTION, "time goes on", 0, GOES_ON)
@@ -106,6 +101,17 @@ def one_pace(nodes: Iterable[Node]) -> bool:
     return len(every) <= 1 and all(v <= most for v in every for _, most in lengths)  # type: ignore[operator]
 
 
+def other_paces(nodes: Sequence[Node]) -> tuple[frozenset[str], str]:
+    """The nodes whose pace does not bound the steps of every node that counts its steps; and why limits in steps are
+    about different steps in different nodes, if they are."""
+    paces = {node.name: pace for node in nodes if (pace := pace_of(node)) is not None}
+    counting = [n.name for n in nodes if any(counts_steps(clause.formula) for clause in n.clauses)]
+    counted = {paces.get(name) for name in counting}
+    others = frozenset(name for name, pace in paces.items() if counted - {pace})
+    apart = counting and (not one_pace(nodes) or len(counted - {None}) > 1)
+    return others, f"{' and '.join(sorted(paces))} declare different `steps(…)`" if apart else ""
+
+
 @dataclass(slots=True)
 class Timed(Records):
     """The cells of some formulas, which may have limits in seconds."""
@@ -118,7 +124,7 @@ class Timed(Records):
 
     def clause(self, formula: t.Term) -> t.Term:
         """A clause at a step and in the silence before it. Raises Unsaid without having made a cell."""
-        if timed(formula) is None:
+        if timed(formula) is None or (self.apart and counts_steps(formula)):
             return Records.clause(self, formula)
         with self._undone():
             held = self.positions(formula)
