@@ -327,6 +327,8 @@ class Backend(ABC):
     uses_source: bool = False
     """Whether an answer may depend on the node's `source:`, `numbers:` and `memory:`. With False they are not in the
     job."""
+    needs_source: str = ""
+    """The key of `source:` that it cannot do without (`cpp`, `python`): reports suggest it only for nodes with one."""
     uses_criticality: bool = False
     """Whether an answer may depend on the node's `criticality:`. With False it is empty in the job."""
     claims: tuple[ProgramClaim, ...] = ()

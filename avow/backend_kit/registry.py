@@ -13,6 +13,7 @@ from avow.base import process
 from avow.base.codes import Code
 from avow.base.codes_workspace import CORE_CODES
 from avow.base.diagnostics import Diagnostic, Rejected
+from avow.base.suggestions import suggest
 
 GROUP = "avow.backends"
 
@@ -49,8 +50,8 @@ def backend(name: str, plugins: tuple[str, ...] = ()) -> Backend:
             return plugin
     point = installed().get(name)
     if point is None:
-        known = ", ".join(sorted({*installed(), *(p.name for p in _plugins(plugins))}))
-        raise Rejected(Diagnostic("BACKEND002", f"there is no backend named '{name}'", hint=f"known: {known}"))
+        known = sorted({*installed(), *(p.name for p in _plugins(plugins))})
+        raise Rejected(Diagnostic("BACKEND002", f"there is no backend named '{name}'", hint=suggest(name, known)))
     try:
         found = point.load()
     except Exception as error:

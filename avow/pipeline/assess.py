@@ -209,18 +209,16 @@ def _given_up(surveyed: Survey, entries: Sequence[Entry], root: Path) -> dict[tu
 
 
 def _methods(state: State, surveyed: Survey) -> tuple[MethodInfo, ...]:
-    plugins = surveyed.system.plan.plugins
-    found = []
+    system, found = surveyed.system, []
+    sources = {node.node: node.source for node in system.plan.nodes}
     for name in names():
-        tool = backend(name, plugins)
+        tool = backend(name, system.plan.plugins)
         missing = [t for t in tool.tools() if not t.present and not t.optional]
-        install = missing[0].install if missing else ""
-        unsuited = tuple(node.name for node in surveyed.system.contract.nodes if not tool.suits(node))
-        found.append(
-            MethodInfo(
-                tool.name, tool.title, tool.strength, tool.link, tool.green_means, not missing, install, unsuited
-            )
-        )
+        install, key = missing[0].install if missing else "", tool.needs_source
+        lacking = {n.name for n in system.contract.nodes if key and not getattr(sources.get(n.name), key, "")}
+        unsuited = tuple(n.name for n in system.contract.nodes if n.name in lacking or not tool.suits(n))
+        words = tool.name, tool.title, tool.strength, tool.link, tool.green_means
+        found.append(MethodInfo(*words, not missing, install, unsuited))
     return tuple(found)
 
 

@@ -43,7 +43,7 @@ def of_plan(
     """Findings about a plan that can be read: its account of the ROS graph, its requirements' sentences, and each
     method's options; without the warnings that the plan switches off. `clean` and `shelf`: as for `diagnostics`."""
     found = [
-        *(d for d in dataflow(system).findings if d.code.startswith("ROS")),
+        *dataflow(system).findings,
         *launched.told(system),
         *unknown_types(system.plan, system.contract),
         *turned(system.plan, system.contract),
@@ -138,9 +138,9 @@ def _method(
     try:
         tool = method_backend(system, method)
     except Rejected as rejected:
-        if any(d.code != "BACKEND005" for d in rejected.diagnostics):
-            raise
-        yield from (replace(d, severity=Severity.WARNING, span=method.options.span) for d in rejected.diagnostics)
+        for d in rejected.diagnostics:
+            severity = Severity.WARNING if d.code == "BACKEND005" else d.severity
+            yield replace(d, severity=severity, span=method.options.span)
         return
     whole = f"nodes.{node}: {method.id}"
     with asking(tool.name, "options_schema"):

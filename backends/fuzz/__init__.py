@@ -29,6 +29,7 @@ class FuzzBackend(Backend):
     uses_scenario = False
     uses_wiring = False
     uses_source = True
+    needs_source = "cpp"
     options_schema = schema(
         {
             "runs": whole_number("how many runs libFuzzer makes", 100_000_000, 20_000),

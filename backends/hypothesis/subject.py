@@ -13,7 +13,7 @@ from avow.backend_kit.given import existing_file
 from avow.backend_kit.protocol import Job
 from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.base.files import inside, read_regular
-from avow.base.suggestions import did_you_mean
+from avow.base.suggestions import did_you_mean, suggest
 from avow.drive.steps import coded
 from avow.formulas.formula import free_variables
 from avow.language.sorts import (
@@ -77,8 +77,9 @@ def subject(job: Job) -> SubjectFile:
         assert job.source is not None
         declared = defined.get(job.source.class_name)
         if not isinstance(declared, ast.ClassDef):
-            where = job.source.place.at("source", "class")
-            raise Rejected(Diagnostic("HYPO102", f"`{found.name}` defines no class `{job.source.class_name}`", where))
+            where, wanted = job.source.place.at("source", "class"), job.source.class_name
+            hint = suggest(wanted, [name for name, one in defined.items() if isinstance(one, ast.ClassDef)])
+            raise Rejected(Diagnostic("HYPO102", f"`{found.name}` defines no class `{wanted}`", where, hint=hint))
         if job.source.kind is not Driving.STEP:
             return found
         begun = _method(declared, "__init__")

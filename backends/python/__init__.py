@@ -26,6 +26,7 @@ class PythonBackend(Backend):
     uses_scenario = False
     uses_wiring = False
     uses_source = True
+    needs_source = "python"
     claims = (ProgramClaim.LINKED,)
     options_schema = schema({"nan": NAN})
     codes = CODES

@@ -10,6 +10,7 @@ import pytest
 from avow.base.codes_plan import PLAN_CODES
 from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.base.graphs import components, cycles_in
+from avow.pipeline.plan_check import of_plan
 from avow.system.graph import dataflow
 from avow.system.load import load_bare, load_path, load_system
 from avow.system.plan import Endpoint, System
@@ -195,9 +196,21 @@ LOOP = node("a", "y : REAL", "x : REAL") + node("b", "x : REAL", "y : REAL")
     ],
 )
 def test_start_up_deadlock(tmp_path: Path, plan: str, deadlocks: int) -> None:
-    graph = dataflow(make(tmp_path, LOOP, plan))
+    system = make(tmp_path, LOOP, plan)
+    graph = dataflow(system)
     assert len(graph.deadlocks) == deadlocks
     assert [finding.code for finding in graph.findings] == ["PLAN123"] * deadlocks
+    assert [d.code for d in of_plan(system)] == ["PLAN123"] * deadlocks
+
+
+def test_a_method_that_nobody_knows_has_its_place_and_the_nearest_name(tmp_path: Path) -> None:
+    plan = "nodes: {a: {methods: [{hypotesis: {}}]}}"
+    (found,) = (d for d in of_plan(make(tmp_path, A + B, plan)) if d.is_error)
+    assert (found.code, found.hint, found.span and found.span.column) == (
+        "BACKEND002",
+        "did you mean `hypothesis`?",
+        plan.index("{}") + 1,
+    )
 
 
 def test_one_output_has_one_first_value(tmp_path: Path) -> None:

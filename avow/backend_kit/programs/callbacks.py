@@ -397,13 +397,9 @@ def shown(wire: Wire, data: Any, known: Definitions, kind: Driving) -> Any:
 
 
 def _words(sort: Any) -> tuple[str, ...]:
-    match sort:
-        case EnumSort(members=members):
-            return members
-        case DataSort(constructors=constructors):
-            return tuple(constructor.name for constructor in constructors)
-        case _:  # numbers are drawn separately, and no other sort has words
-            return ()
+    if isinstance(sort, DataSort):
+        return tuple(constructor.name for constructor in sort.constructors)
+    return sort.members if isinstance(sort, EnumSort) else ()  # numbers are drawn separately, other sorts have no words
 
 
 def _with_floats(made: Any, before: Any) -> Any:
