@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from fractions import Fraction
 
 from avow.evaluation.evaluate import NotEvaluable, evaluate
-from avow.formulas.values import Value
+from avow.formulas.values import Binary, Value
 from avow.language.subterms import ports_of
 from avow.language.terms import Term, Variable
 from avow.solving.replay import opaque_sorts, replay
@@ -24,6 +25,24 @@ def judge(term: Term, valuation: Mapping[str, Value], *, effort: int = 5_000) ->
     if not sorts.keys() <= valuation.keys():
         return None
     return replay([term], {v: valuation[v.qualified] for v in sorts.values()}, effort=effort)
+
+
+def as_shown(term: Term, values: Mapping[str, Value]) -> str:
+    """A note on a formula that values break and that holds of the digits by which the values are shown: the exact
+    numbers, and what to do. Empty for any other formula."""
+    names = {v.qualified for v in ports_of(term)}
+    held = {n: v for n, v in values.items() if n in names and isinstance(v, Binary)}
+    apart = {n: Fraction(v.digits) for n, v in held.items() if Fraction(v.digits) != v}
+    try:
+        if not apart or evaluate(term, {**values, **apart}) is not True:
+            return ""
+    except NotEvaluable:
+        return ""
+    exactly = (f"{n} is {held[n].digits} {'+-'[held[n] < v]} {float(abs(held[n] - v)):.2g}" for n, v in apart.items())
+    told = ", ".join(exactly)
+    return (
+        f"; exactly, {told}, since no float is the decimal number: allow a tolerance in the clause, or see `numbers:`"
+    )
 
 
 def judge_open(term: Term, valuation: Mapping[str, Value], *, effort: int = 5_000) -> bool | None:

@@ -16,6 +16,7 @@ from avow.base.files import read_text
 from avow.base.suggestions import did_you_mean
 from avow.base.verdict import Counterexample, Hypothesis, HypothesisKind, Outcome, Verdict
 from avow.drive.steps import coded, plain
+from avow.evaluation.truth import as_shown
 from avow.evidence.obligation import Obligation, ProgramClaim
 from avow.evidence.record import CASE
 from avow.formulas.values import Value
@@ -125,6 +126,7 @@ class Bench:
                 elif not held:
                     zeros = [n for n, v in run[at].items() if str(v) == "-0.0"]
                     signed = f" ({', '.join(f'in.{n}' for n in zeros)} is -0.0)" if zeros else ""
+                    signed += as_shown(each.formula.term, step[-1].values)
                     why = step[-1].wrong or f"guarantee {name} does not hold of these{signed}"
                     self.broken[name] = Broken(
                         run[: at + 1], step, f"{why}: there is no output"[:400] if step[-1].wrong else why

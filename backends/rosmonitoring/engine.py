@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any
 
+from avow.evaluation.truth import as_shown
 from avow.formulas.formula import free_variables
 from avow.formulas.temporal.cells import remembers
 from avow.formulas.values import Value
@@ -468,6 +469,8 @@ class Monitor:
         snapshot: Mapping[str, Value] | None = None,
     ) -> Violation:  # fmt: skip
         values, pairs = shown(watched, snapshot) if watched is not None and snapshot is not None else ((), ())
+        if watched is not None and snapshot is not None and watched.steps is None:
+            explanation += as_shown(watched.clause.formula, snapshot)
         heard = self.heard_of(watched.names) if watched is not None else {}
         name, time = self.setup.node.name, time_text(event.get("time"))
         return Violation(fault, name, clause, self.events, time, values, pairs, explanation, heard)

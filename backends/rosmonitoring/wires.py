@@ -270,20 +270,16 @@ def of_type(value: Fraction, wire: Wire | None) -> Fraction:
 
 def _float(raw: Any, *, wide: bool, gaps: frozenset[Gap]) -> Fraction:
     kind = raw.__class__
-    if kind is bytes:
-        return _of_text(raw.decode(), wide)
-    if kind is int:
-        return _of_text(str(raw), wide)
+    if kind is bytes or kind is int:
+        return _of_text(raw.decode() if kind is bytes else str(raw), wide)
     if isinstance(raw, float):
         if math.isfinite(raw):
             return _of_float(float(raw), wide)
         gap = Gap.NAN if math.isnan(raw) else Gap.INF
         if gap in gaps:
             raise NoReading(f"{raw} is no reading")
-        word = gap.value
-        raise MappingError(
-            f"{raw} is not a number; if it means no reading, map it: `{{…, {word}: none, elsewhere: …}}`"
-        )
+        advice = f"if it means no reading, map it: `{{…, {gap.value}: none, elsewhere: …}}`"
+        raise MappingError(f"{raw} is not a number; {advice}")
     raise MappingError(f"{show(raw)} is not a number")
 
 

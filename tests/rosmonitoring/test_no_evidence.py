@@ -140,6 +140,26 @@ def test_a_time_without_a_unit_is_one_fault(make_system: Make, options: dict[str
     assert all("a time with a unit, such as 50 ms" in d.message for d in caught.value.diagnostics)
 
 
+@pytest.mark.parametrize(
+    ("bound", "said", "told"),
+    [
+        ("<= 0.2", 0.2, "; exactly, out.v is 0.2 + 1.1e-17, since no float is the decimal number: allow a tolerance"),
+        (">= 0.3", 0.3, "; exactly, out.v is 0.3 - 1.1e-17"),
+        ("== 0.5", 0.25, ""),
+        ("<= 0.2", 0.3, ""),
+    ],
+)
+def test_a_breach_that_looks_met_says_the_exact_number(
+    make_system: Make, tmp_path: Path, bound: str, said: float, told: str
+) -> None:
+    rcl = ONE.replace("in.r >= 120 -> out.v == 0", f"in.r >= 120 -> out.v {bound}")
+    messages = {"std_msgs/Float64": "float64 data\n"}
+    found = judged(make_system, tmp_path, rcl, events(("r", 130.0), ("v", said)), messages=messages)
+    assert found.verdict is Verdict.REFUTED
+    assert (told or "in.r") in found.summary
+    assert ("exactly" in found.summary) is bool(told)
+
+
 def test_a_slip_in_the_mapping_is_one_fault_for_check_and_monitor(make_system: Make) -> None:
     """The other entries are read: the fields that they name are not in doubt."""
     messages = {"a/V": "float64 x\nfloat64 y\n"}
