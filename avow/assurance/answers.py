@@ -66,7 +66,7 @@ MEANINGS = {
     Level.SHOWN: "everything below is proved, or checked exhaustively, of what runs",
     Level.MODELS: "something below is proved or checked of a model only: what runs may differ",
     Level.TESTS: "something below is sampled: tests, recordings or measurements",
-    Level.ARGUED: "something below rests on a person's word",
+    Level.ARGUED: "a person vouches for the sentence or for a guarantee below",
     Level.NOT_SHOWN: "missing, stale, not validated, or resting on what is not shown",
     Level.REFUTED: "there is a counterexample",
     Level.EXAMINED: "known-bad material, or a plan that names no requirement",

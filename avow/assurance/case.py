@@ -157,18 +157,20 @@ def conclude(facts: Facts) -> Case:
         *remarks(facts.sources, views),
     )
     single = _single(views)
-    basis = whole.claims if not closed else {n for c in closed.values() for n in c.claims}
     weakened = deficits(
-        views, requirements, supposed, listed, findings, relied, single, basis, facts.run.id, missing_tools(facts)
+        views, requirements, supposed, listed, findings, relied, single, facts.run.id, missing_tools(facts)
     )
     changed = changes(facts.baseline, requirements, views, supposed, weakened)
+    basis = {n for c in closed.values() for n in c.claims} if closed else set(whole.claims)
+    basis |= {n for h in hazards for n in h.closure}
     weakest = weakest_of(basis, by_id, relied, titles)
-    following = weakest_of(basis, by_id, relied, titles, beside=weakest.node) if weakest else None
+    following = weakest_of(basis - {weakest.claim}, by_id, relied, titles) if weakest else None
     if weakest is not None:
         needing = tuple(r.id for r in requirements if weakest.claim in r.closure)
         rest = [r.weakest_evidence for r in requirements if r.id not in needing and r.weakest_evidence]
         beside = sum(w.node == weakest.node and w.claim != weakest.claim for w in rest)
-        weakest = replace(weakest, needed_by=needing, beside=beside)
+        dangers = tuple(h.hazard.id for h in hazards if weakest.claim in h.closure)
+        weakest = replace(weakest, needed_by=(*needing, *dangers), beside=beside)
     code = exit_code(found)
     told = answers(
         requirements,

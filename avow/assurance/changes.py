@@ -162,11 +162,5 @@ def _deficits(old: Baseline, deficits: Sequence[Deficit]) -> Iterator[ChangeLine
             yield ChangeLine("deficit", w.key, f"{w.words}: {was or 'none'} → {w.count}", str(was), str(w.count))
     now = {w.key: w.count for w in deficits}
     for key, was in old.deficits:
-        if now.get(key, 0) < was:
-            yield ChangeLine(
-                "better",
-                key,
-                f"{words_of(key, was)}: {was} → {now.get(key, 0) or 'none'}",
-                str(was),
-                str(now.get(key, 0)),
-            )
+        if (left := now.get(key, 0)) < was:
+            yield ChangeLine("better", key, f"{words_of(key, was)}: {was} → {left or 'none'}", str(was), str(left))

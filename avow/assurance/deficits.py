@@ -13,6 +13,8 @@ from avow.evidence.obligation import Kind
 from avow.evidence.status import Status, weigh
 
 _WORDS = {
+    "open": ("guarantee{s} without support", "without support", "Missing, unanswered, vacuous or refuted."),
+    "premises": ("premise{s} of the composition without support", "open premises", "What follows is conditional."),
     "argued": ("argued, not derived", "argued", "A person must agree that what is named amounts to the sentence."),
     "unvalidated": (
         "sentence{s} without a validation",
@@ -21,12 +23,8 @@ _WORDS = {
     ),
     "models": ("guarantee{s} shown of a model only", "of models", "What runs may differ from the model."),
     "bounded": ("requirement{s} within bounds only", "bounded", "Nothing is said outside what was searched."),
-    "unowned": (
-        "assumption{s} without owner or date",
-        "without owner",
-        "Nobody is named to keep them true, or they never expire.",
-    ),
-    "sampled": ("guarantee{s} sampled, not proved", "sampled", "Other inputs and other runs may behave otherwise."),
+    "unowned": ("assumption{s} without owner or end", "without owner", "Nobody keeps them true, or they never end."),
+    "sampled": ("claim{s} sampled, not proved", "sampled", "Other inputs and other runs may behave otherwise."),
     "read": ("guarantee{s} on a person's reading only", "only read", "No tool has looked at them."),
     "single": ("guarantee{s} with one method only", "by one method", "An error of that tool would not be noticed."),
     "tied": (
@@ -40,11 +38,7 @@ _WORDS = {
         "programs not run",
         "The tool that would run the program is missing: nothing is known of these claims.",
     ),
-    "withdrawn": (
-        "refutation{s} by what the plan no longer uses",
-        "no longer used",
-        "It refuted, and then left the plan.",
-    ),
+    "withdrawn": ("refutation{s} by what the plan no longer uses", "no longer used", "It refuted, and left the plan."),
     "conditional": ("review{s} with conditions", "reviewed with conditions", "The reviewer names further conditions."),
     "advice": ("open remark{s}", "remarks", "They fail no gate; read them."),
     "excused": ("finding{s} accepted by a person", "excused", "A named person takes responsibility for a finding."),
@@ -75,33 +69,34 @@ def deficits(
     findings: Sequence[Handled],
     relied: Mapping[str, Relied],
     single: Sequence[str],
-    basis: Iterable[str],
     run: str,
     missing: Mapping[tuple[str, str], str],
 ) -> tuple[Deficit, ...]:
-    """`basis`: the obligations that matter (all that requirements rest on); `single`: guarantees with one method;
-    `missing`: (node, method) → the command that installs the method's missing tool."""
-    within = set(basis)
-    guarantees = [v for v in views if v.id in within and v.obligation.kind is Kind.GUARANTEE]
+    """Of the whole case, whether or not a requirement rests on it, as in the tables of nodes and of assumptions.
+    `single`: guarantees with one method; `missing`: (node, method) → the command that installs the missing tool."""
+    guarantees = [v for v in views if v.obligation.kind is Kind.GUARANTEE]
+    leaves = [v for v in views if v.obligation.kind in (Kind.GUARANTEE, Kind.REQUIREMENT)]
     unrun = [(v, method) for v in guarantees for method in _unanswered(v)]
     programs = [v for v in views if v.obligation.kind is Kind.PROGRAM and v.status is Status.NOT_RUN]
     found = {
+        "open": [v.id for v in guarantees if not v.standing.supports],
+        "premises": [v.id for v in views if v.obligation.kind is Kind.COMPOSITION and not v.standing.supports],
         "argued": [r.id for r in requirements if r.level is Level.ARGUED],
         "unvalidated": [r.id for r in requirements if not r.validated],
         "bounded": [r.id for r in requirements if r.bounded and r.level.holds],
         "models": [v.id for v in guarantees if v.id in relied and looked_at(relied[v.id]) is Object.MODEL],
         "unowned": [s.key for s in assumptions if not s.owned],
-        "sampled": [v.id for v in guarantees if _status(v, relied) in (Status.TESTED, Status.MONITORED)],
+        "sampled": [v.id for v in leaves if _status(v, relied) in (Status.TESTED, Status.MONITORED)],
         "read": [v.id for v in guarantees if _status(v, relied) is Status.REVIEWED],
-        "single": [name for name in single if name in within],
+        "single": list(single),
         "tied": [v.id for v in guarantees if v.id in relied and _by_hand(v, relied[v.id])],
         "unrun": [f"{v.id}: {method}" for v, method in unrun],
         "programs": [v.id for v in programs],
         "withdrawn": [item.claim for item in open_items if item.kind == "withdrawn"],
         "conditional": [v.id for v in guarantees if _on_conditions(v)],
-        "advice": [item.claim for item in open_items if item.kind == "advice" and not item.handled],
+        "advice": [item.claim for item in open_items if item.advice and not item.handled],
         "excused": [name for f in findings if f.how == "accepted" and not f.expired for name in f.obligations],
-        "believed": [v.id for v in views if v.id in within and any(e.entry.evidence.run != run for e in v.counting)],
+        "believed": [f"{v.id}: {r.method}" for v in views for r in v.records if r.run != run],
     }
     remedies = {
         "unrun": _install(unrun, missing),

@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
+from operator import attrgetter
 
 from avow.assurance.answers import (
     Answers,
@@ -25,6 +26,7 @@ from avow.assurance.answers import (
 from avow.assurance.changes import MARKS, baseline_of
 from avow.assurance.deficits import briefly, of_deficits
 from avow.assurance.model import Case, Gate, NodeView, ObligationView, RequirementView
+from avow.assurance.rates import NO_RATE
 from avow.assurance.relied import (
     EVIDENCE,
     EXHAUSTIVE,
@@ -37,14 +39,17 @@ from avow.assurance.relied import (
     seen,
     weakness,
 )
+from avow.assurance.summary import refutation
 from avow.base.plain import count, listed
-from avow.evidence.obligation import Kind
+from avow.evidence.obligation import SYSTEM_LEVEL, Kind
 from avow.evidence.status import Status
 
-ROWS, WORST, NODES, SQUARES, LINES, OWNERS = 6, 3, 8, 12, 5, 3
-"""The most requirements that have a row each; else the number of the worst; nodes; squares for a node; changes;
-owners."""
+ROWS, WORST, NODES, SQUARES, LINES, OWNERS, REASON = 6, 3, 8, 12, 5, 3, 72
+"""The most requirements that have a row each; else the number of the worst, and of refutations; nodes; squares for a
+node; changes; owners; characters of a counterexample."""
+_FELLED = (Kind.GUARANTEE, Kind.REQUIREMENT, Kind.COMPOSITION, Kind.PROGRAM, Kind.SANITY, Kind.WELL_FORMED)
 _WORST_FIRST = tuple(reversed(Level))
+_rank = attrgetter("rank")
 
 
 def tone_of(level: Level, supposed: Iterable[Assumption], *, bounded: bool = False) -> Tone:
@@ -60,17 +65,14 @@ def weakest_of(
     views: Mapping[str, ObligationView],
     relied: Mapping[str, Relied],
     titles: Mapping[str, str],
-    *,
-    beside: str = "",
 ) -> WeakestEvidence | None:
-    """The weakest evidence among claims; of another node than `beside`, if given."""
+    """The weakest evidence among claims."""
     found = [
         name
         for name in claims
         if name in relied
         and relied[name].status in EVIDENCE
         and views[name].obligation.kind in (Kind.GUARANTEE, Kind.REQUIREMENT)
-        and not (beside and views[name].obligation.node == beside)
     ]
     own = [name for name in found if views[name].obligation.kind is Kind.GUARANTEE]
     if not found:
@@ -114,21 +116,25 @@ def answers(
     unrun = next((d.count for d in deficits if d.key == "programs"), 0)
     if unrun and headline.holds:  # the programs were not examined
         verdict = f"{verdict}; {count(unrun, 'claim')} about programs not run"
-        tone = min(tone, Tone.AMBER, key=lambda t: t.rank)
+        tone = min(tone, Tone.AMBER, key=_rank)
     warned = ""
     bad = sum(bool(view.handled) and not view.standing.supports for view in views)
     if bad and passed:  # whatever else holds: with a known-bad finding the case is not green
-        warned, tone = f"{WARNED}: {count(bad, 'finding')} known", Tone.RED if tone is Tone.RED else Tone.AMBER
+        warned, tone = (
+            f"{WARNED}: {count(bad, 'finding')} known",
+            Tone.RED if strict else min(tone, Tone.AMBER, key=_rank),
+        )
     by_level = tuple((level, number[level]) for level in _WORST_FIRST if number[level])
     asked = [gate for gate in gates if not gate.idle]
     good = sum(gate.passed for gate in asked)
+    idle = f", {len(gates) - len(asked)} not asked" if len(asked) < len(gates) else ""
     kinds = len(deficits)
     by_node: dict[str, list[ObligationView]] = {node.name: [] for node in nodes}
     for view in views:
         by_node.setdefault(view.obligation.node, []).append(view)
     ranked = [_basis(node, by_node[node.name], relied) for node in nodes]
     basis = [b for b, _ in (sorted(ranked, key=lambda pair: pair[1]) if len(ranked) > NODES else ranked)]
-    owned = sum(s.owned for s in assumptions)
+    owned = sum(bool(s.who and s.until) for s in assumptions)
     return Answers(
         headline=headline,
         verdict=verdict,
@@ -136,13 +142,13 @@ def answers(
         by_level=by_level,
         counts=" · ".join(f"{many} {level}" for level, many in by_level) or "no requirement",
         weakened=of_deficits(kinds) if kinds else "no deficit",
-        gates=f"policy: {good} of {count(len(asked), 'gate')} pass" + ("es" if len(asked) == 1 else ""),
+        gates=f"policy: {good} of {count(len(asked), 'gate')} pass" + "es" * (len(asked) == 1) + idle,
         listed=_listed(requirements),
         based_on=tuple(basis[:NODES]),
         bases=tuple(sorted(basis, key=lambda b: b.node)),
         more_nodes=f"and {count(len(basis) - NODES, 'node')} on no less" if len(basis) > NODES else "",
         weakest=weakest,
-        next_weakest=f"{following.title}, {following.words}" if following else "",
+        next_weakest=f"{following.title}: “{following.quote}”: {following.words}" if following else "",
         refuted=_refuted(requirements, views, nodes),
         supposed=tuple(_lines(assumptions)),
         owned=f"{owned} of {len(assumptions)}" if assumptions else "",
@@ -187,10 +193,11 @@ def _verdict(
     if missing:
         return Level.NOT_SHOWN, said(Level.NOT_SHOWN, f"{len(missing)} {of_all} not validated"), Tone.AMBER
     level = max((r.level for r in requirements), key=tuple(Level).index)
-    tone = min((r.tone for r in requirements), key=lambda t: t.rank)
-    rates = [r.rate for r in requirements if r.rate is not None and level is Level.TESTS]
+    tone = min((r.tone for r in requirements), key=_rank)
+    rates = [r.rate for r in requirements if r.rate is not None]
     worst = max(rates, key=lambda rate: Fraction(rate.bound or 1), default=None)
-    return level, said(level) + (f" ({worst.brief})" if worst else ""), tone
+    brief = worst.brief if worst and level is Level.TESTS else NO_RATE  # of what is argued, no sample gives a rate
+    return level, said(level) + (f" ({brief})" if worst else ""), tone
 
 
 def _badness(view: RequirementView) -> tuple[int, int, int]:
@@ -251,17 +258,29 @@ def _mark(view: ObligationView, relied: Mapping[str, Relied]) -> tuple[str, Tone
 def _refuted(
     requirements: Sequence[RequirementView], views: Sequence[ObligationView], nodes: Sequence[NodeView]
 ) -> str:
-    """The refutation, and the requirements that are open; a node's guarantee before the claims that rest on it. Empty
-    if nothing is refuted."""
+    """The refutations with their counterexamples, and the requirements that do not hold: one for each node and one for
+    the whole system, a guarantee before the claims that rest on it. Empty if nothing is refuted."""
     wrong = [v for v in views if v.status in (Status.REFUTED, Status.CONTRADICTORY) and not v.advice]
     if not wrong:
         return ""
-    felled = [r.id for r in requirements if not r.level.holds]
-    first = min(wrong, key=lambda v: v.obligation.kind is not Kind.GUARANTEE).obligation
-    where = next((f"{node.title}: " for node in nodes if node.name == first.node), "")
-    more = f", and {count(len(wrong) - 1, 'more claim')}" if len(wrong) > 1 else ""
-    takes = f" Open: {listed(felled, 6)}." if felled else ""
-    return f"Refuted: {where}“{first.claim.rstrip('.')}”{more}.{takes}"
+    titles = {node.name: node.title for node in nodes}
+    first: dict[str, ObligationView] = {}
+    for view in sorted(wrong, key=lambda v: (_FELLED.index(v.obligation.kind), v.obligation.node == SYSTEM_LEVEL)):
+        first.setdefault(view.obligation.node, view)
+    worst, *others = first.values()
+    shown = [worst, *sorted(others, key=lambda v: v.obligation.node != SYSTEM_LEVEL)][:WORST]
+    told = [
+        f"{titles.get(v.obligation.node, 'the whole')}: “{v.obligation.claim.rstrip('.')}” ({_cut(refutation(v)[1])})"
+        for v in shown
+    ]
+    more = f"; and {count(len(wrong) - len(shown), 'more claim')}" if len(wrong) > len(shown) else ""
+    names = {level: [r.id for r in requirements if r.level is level] for level in (Level.REFUTED, Level.NOT_SHOWN)}
+    takes = "".join(f" Requirements {level}: {listed(of, 6)}." for level, of in names.items() if of)
+    return "Refuted: " + "; ".join(told) + f"{more}.{takes}"
+
+
+def _cut(text: str) -> str:
+    return text if len(text) <= REASON else text[: REASON - 1].rstrip() + "…"
 
 
 def _lines(assumptions: Sequence[Assumption]) -> Iterable[SupposedLine]:
@@ -274,7 +293,7 @@ def _lines(assumptions: Sequence[Assumption]) -> Iterable[SupposedLine]:
 
 
 def _owners(assumptions: Sequence[Assumption]) -> str:
-    """``A. Person (3), B. Person (1), assumed since 2026-11-21; the first ends 2027-01-31``."""
+    """``A. Person (3), B. Person (1), assumed since 2026-11-21; the first ends 2027-01-31``, and others."""
     owned = [s for s in assumptions if s.owned]
     number = Counter(s.who for s in owned).most_common()
     if not number:
@@ -285,7 +304,8 @@ def _owners(assumptions: Sequence[Assumption]) -> str:
     since = f", assumed since {' to '.join(dict.fromkeys((made[0], made[-1])))}" if all(made) else ""
     all_end = len(ends) == 1 and all(s.until for s in owned)
     until = f", until {ends[0]}" if all_end else f"; the first ends {ends[0]}" if ends else ""
-    return f"{named}{since}{until}"
+    lasting = sum(not s.until for s in owned)
+    return f"{named}{since}{until}" + (f"; until a text changes: {lasting}" if lasting else "")
 
 
 def _changed(changes: Changes) -> tuple[tuple[str, str], ...]:

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import field
+
 from avow.assurance.answers import Level, Tone
+from avow.base.codec import LATER
 from avow.base.records import dataclass
 from avow.system.plan import Hazard
 
@@ -31,6 +34,8 @@ class HazardView:
     mitigations: tuple[Mitigation, ...]
     level: Level
     tone: Tone
+    closure: tuple[str, ...] = field(default=(), metadata=LATER)
+    """Every obligation that its mitigations rest on."""
 
     @property
     def weakest(self) -> Mitigation | None:

@@ -10,6 +10,7 @@ from avow.assurance.closure import Closure
 from avow.assurance.first_screen import tone_of
 from avow.assurance.hazards import WORST_FIRST, HazardView, Mitigation
 from avow.assurance.model import NodeView, ObligationView, RequirementView
+from avow.assurance.naming import requirement_claim
 from avow.assurance.relied import Opinion, Relied, relied_upon
 from avow.assurance.requirement_views import is_bounded, level_of
 from avow.evidence.obligation import Kind
@@ -77,7 +78,9 @@ def hazard_views(
         pairs = list(map(mitigation, hazard.mitigated_by))
         level = min((m.level for m, _ in pairs), key=WORST_FIRST.index, default=Level.NOT_SHOWN)
         tone = min((tone for _, tone in pairs), key=lambda t: t.rank, default=Tone.RED)
-        found.append(HazardView(hazard, tuple(m for m, _ in pairs), level, tone))
+        own = (name for m, _ in pairs for name in ((requirement_claim(m.name),) if m.name in known else m.claims))
+        below = closure.of(own)
+        found.append(HazardView(hazard, tuple(m for m, _ in pairs), level, tone, below.claims))
     return tuple(found)
 
 

@@ -34,8 +34,6 @@ from avow.evidence.record import Evidence
 from avow.evidence.status import Status
 from avow.system.plan import Statement, Validation
 
-# -- handed in by the pipeline --------------------------------------------------------------------------------------
-
 
 @dataclass(frozen=True, slots=True)
 class RunInfo:
@@ -99,9 +97,6 @@ class Derivation:
     premises: tuple[str, ...] = ()
     side_conditions: tuple[SideCondition, ...] = ()
     conditional: tuple[str, ...] = ()
-
-
-# -- made by conclude ------------------------------------------------------------------------------------------------
 
 
 class Currency(StrEnum):
@@ -245,6 +240,8 @@ class RequirementView:
     """Whether one of these is past its last day."""
     rate: RateView | None = field(default=None, metadata=codec.LATER)
     """How often it may fail, if it rests on samples."""
+    searched: str = field(default="", metadata=codec.LATER)
+    """How far its own formula or property was searched, if not exhaustively."""
     span: Span | None = None
     validation: Validation | None = None
     validated: bool = False
@@ -267,16 +264,21 @@ class RequirementView:
         return sha256("\n".join((self.text, self.formula, self.temporal, *self.supported_by)))
 
     @property
+    def noted(self) -> str:
+        """The text beside its level: how often it may fail, and how far it was searched."""
+        bounds = self.searched or ("within bounds" if self.bounded else "")
+        parts = (self.rate.brief if self.rate and self.rate.bound else "", bounds)
+        return "; ".join(part for part in parts if part) if self.level.holds else ""
+
+    @property
     def stands(self) -> str:
-        """How far it is shown, and how often it may fail if that rests on samples."""
-        return f"{self.level} ({self.rate.brief})" if self.rate and self.level.holds else f"{self.level}"
+        return f"{self.level} ({self.noted})" if self.noted else f"{self.level}"
 
     @property
     def awaits_validation(self) -> bool:
         """Whether only a person's validation of the sentence against the formula is missing."""
-        return (
-            not self.level.holds and self.status.supports and not (self.failing or self.unknown_names or self.expired)
-        )
+        fails = self.failing or self.unknown_names or self.expired
+        return not (self.level.holds or fails) and self.status.supports
 
     @property
     def words(self) -> str:
@@ -322,7 +324,6 @@ class EnvironmentView:
     constant: bool = False
     """Whether it is declared to have the same value at every step."""
     nodes: tuple[str, ...] = ()
-    """The nodes that read it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -425,7 +426,6 @@ class Case:
     kernel: KernelRun
     proofs: tuple[ProofView, ...]
     trusted: tuple[Trusted, ...]
-    """The trusted base."""
     policy: Policy
     exit_code: int
     ledger_head: str

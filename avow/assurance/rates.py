@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 LEAST_CONFIDENCE = Fraction(9, 10)
 """Below it, a rate is no evidence that a policy's limit is met."""
 
+NO_RATE = "no failure rate"
 _SAMPLED = (Status.TESTED, Status.MONITORED)
 
 _TRIALS = {
@@ -56,7 +57,7 @@ class RateView:
     def brief(self) -> str:
         """The text beside the level. A bound is rounded up, a confidence down."""
         if not self.bound or Fraction(self.bound) >= 1:
-            return "with no bound on failures"
+            return NO_RATE
         sure = percent(self.confidence, ROUND_FLOOR)
         return f"at most {percent(self.bound, ROUND_CEILING)} of {self.trial}s fail, at {sure} confidence"
 

@@ -199,6 +199,8 @@ def seen(relied: Relied) -> str:
             else:
                 told = f"{count(cases, 'case')}, none failed"
             return told + _at_most(relied.record)
+        case Status.TESTED if isinstance(bound.get("depth"), int):
+            return f"searched to step {bound['depth']}, not exhaustively"
         case Status.MONITORED if isinstance(bound.get("judged"), int):
             traces = bound.get("traces")
             on = f" on {count(len(traces), 'recorded run')}" if isinstance(traces, Mapping | list) and traces else ""

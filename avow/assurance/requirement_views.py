@@ -11,7 +11,7 @@ from avow.assurance.first_screen import tone_of, weakest_of
 from avow.assurance.model import ObligationView, RequirementView
 from avow.assurance.naming import requirement_claim, short
 from avow.assurance.rates import RateView, rate_of
-from avow.assurance.relied import Relied, looked_at
+from avow.assurance.relied import Relied, looked_at, seen
 from avow.assurance.summary import worst_first
 from avow.assurance.support import Names, requirement_support
 from avow.base.plain import count, listed
@@ -80,10 +80,11 @@ def held(
         tone=Tone.AMBER if awaits else tone_of(level, mine, bounded=bounded),
         closure=closed.claims,
         failing=closed.failing,
-        weakest_evidence=(_failing_of(closed, views, titles) if fails else None)
+        weakest_evidence=(_failing_of(view, closed, views, titles) if fails else None)
         or weakest_of(closed.claims, views, relied, titles),
         supposes=tuple(s.key for s in mine),
         rate=rate,
+        searched=next((seen(r) for n in view.obligations if (r := relied.get(n)) and r.status is Status.TESTED), ""),
         answer=_with_level(view, level, rate, awaits=awaits),
     )
 
@@ -116,12 +117,13 @@ def level_of(claims: Iterable[str], views: Mapping[str, ObligationView], relied:
 
 
 def _failing_of(
-    closed: Closed, views: Mapping[str, ObligationView], titles: Mapping[str, str]
+    view: RequirementView, closed: Closed, views: Mapping[str, ObligationView], titles: Mapping[str, str]
 ) -> WeakestEvidence | None:
-    """The failing claim below an open requirement, in place of the weakest evidence; of several a guarantee first, then
-    the worst."""
+    """The failing claim below an open requirement, in place of the weakest evidence: what refutes the requirement
+    itself; else of several a guarantee first, then the worst."""
     statuses = {name: views[name].status for name in closed.failing if name in views}
-    own = [name for name in statuses if views[name].obligation.kind is Kind.GUARANTEE]
+    own = [name for name in view.obligations if statuses.get(name) in (Status.REFUTED, Status.CONTRADICTORY)]
+    own = own or [name for name in statuses if views[name].obligation.kind is Kind.GUARANTEE]
     for name in worst_first(own or statuses, statuses)[:1]:
         o, status = views[name].obligation, statuses[name].value
         return WeakestEvidence(name, o.node, titles.get(o.node, "the whole"), status, o.claim.rstrip("."), status)
@@ -146,6 +148,8 @@ def _answer(
         name, status = standing.weakest
         hypotheses = len(standing.hypotheses)
         rest = f"; it rests on {count(hypotheses, 'hypothesis', 'hypotheses')}" if hypotheses else ""
+        if status is Status.JUSTIFIED:
+            return f"Below it, {short(name)} is assumed for a person's reason{rest}."
         return f"The weakest claim under it is {short(name)}, {status.value}{rest}."
     if standing.direct and standing.status is not Status.MISSING:
         own = [name for name in own_obligations if name in standing.below]

@@ -162,11 +162,9 @@ def _summary(view: ObligationView) -> str:
     """The decisive evidence in a line: a refutation's counterexample, else the last attempt's summary."""
     if view.obligation.unwritten:
         return "nothing: it is a draft's placeholder"
-    refuting = [r for r in view.records if weigh(r).refuted]
-    if refuting:
-        record = refuting[-1]
-        example = record.counterexample.text() if record.counterexample else ""
-        return f"{record.method}: {example or record.summary}"
+    method, found = refutation(view)
+    if method:
+        return f"{method}: {found}"
     telling = [r for r in view.records if weigh(r).status is view.status]
     if telling:
         record = telling[-1]
@@ -175,6 +173,14 @@ def _summary(view: ObligationView) -> str:
         record = view.evidence[-1].entry.evidence
         return f"was {record.verdict} by {record.method} on {record.started[:10]}; what it rests on has changed since"
     return "no method is planned for it" if not view.planned else "its methods have not run"
+
+
+def refutation(view: ObligationView) -> tuple[str, str]:
+    """The method that refuted a claim last, and its counterexample or summary; both empty if none did."""
+    record = next((r for r in reversed(view.records) if weigh(r).refuted), None)
+    if record is None:
+        return "", ""
+    return record.method, (record.counterexample.text() if record.counterexample else "") or record.summary
 
 
 def _has_vacuous(view: ObligationView) -> bool:

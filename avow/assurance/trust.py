@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 
 from avow.assurance.answers import Assumption, TrustLine
@@ -35,10 +36,7 @@ def trust_lines(
         several = f"{twice} of {len(certified)} answered by two solvers"
         second = several if len(kernel.solvers) > 1 else "no second solver"
         lines.append(TrustLine("solvers", names, second, twice < len(certified) or not twice))
-    tools: dict[str, int] = {}
-    for proof in proofs:
-        for tool in proof.tools:
-            tools[tool] = tools.get(tool, 0) + 1
+    tools = Counter(tool for proof in proofs for tool in proof.tools)
     if tools:
         names = listed([f"{tool} ({many})" for tool, many in sorted(tools.items())], 4)
         lines.append(

@@ -20,6 +20,7 @@ from avow.pipeline.results import Result
 
 GOOD = ("proved", "checked", "tested", "monitored", "reviewed", "justified")
 BAD = ("refuted", "contradictory", "error", "missing", "stale", "vacuous", "unknown", "not-run", "unsupported")
+_COLOURS = {"red": "red", "amber": "yellow", "grey": "dim"}
 
 
 def print_summary(
@@ -38,9 +39,7 @@ def print_summary(
         table.add_column(head, justify="right", style="red" if word in ("refuted", "contradictory", "error") else None)
     table.add_column("verdict")
     for r in sorted(results, key=lambda r: r.system):
-        colour = (
-            "red" if r.exit_code else "yellow" if r.tone == "amber" else "green" if r.tone in ("", "green") else "dim"
-        )
+        colour = "red" if r.exit_code else _COLOURS.get(r.tone, "green")
         verdict = f"[{colour}]{escape(r.verdict or _gates(r))}[/]"
         table.add_row(r.system, *(str(r.counts.get(word, "")) or "" for word in shown), verdict)
     for name in broken:

@@ -38,6 +38,7 @@ class Facts:
         self.assumptions: list[Json] = case["assumptions"]
         self.views: list[Json] = case["obligations"]
         self.guarantees = [v for v in self.views if v["obligation"]["kind"] == "guarantee"]
+        self.hazards: list[Json] = case.get("hazards") or []
         self.gates = [g for g in case["gates"] if not g.get("idle")]
         self.failing = [g for g in case["gates"] if not g["passed"]]
         self.quoted = {" ".join(text.split()) for text in self._texts()}
@@ -55,6 +56,8 @@ class Facts:
                 _id(v),
             )
             yield from (r["numbers"] for r in records(v))
+            for told in map(_refuting, records(v)):
+                yield from (told, told[:71].rstrip() + "…")
         yield from (f"{name} {version}" for name, version in self.case["kernel"]["solvers"].items())
         yield from (p for proof in self.case["proofs"] for p in proof.get("tools") or ())
         for gate in self.case["gates"]:
@@ -77,7 +80,7 @@ class Facts:
         return [a for a in self.assumptions if a["who"] and (a["until"] or a["sort"] == "meaning")]
 
     def owned(self) -> int:
-        return len(self.owned_ones())
+        return sum(bool(a["until"]) for a in self.owned_ones())
 
     def numbers(self, sort: str) -> list[int]:
         return [int(a["number"][1:]) for a in self.assumptions if a["sort"] == sort]
@@ -86,6 +89,10 @@ class Facts:
         advice = {item["claim"] for item in self.case["open_items"] if item["kind"] == "advice"}
         bad = [v for v in self.views if v["status"] in ("refuted", "contradictory")]
         return [v for v in bad if not v["obligation"].get("advisory") and _id(v) not in advice]
+
+    def wronged(self) -> int:
+        """Nodes with a refuted claim, the whole system among them."""
+        return len({v["obligation"]["node"] for v in self.wrong()})
 
     def known(self) -> int:
         """Findings that the plan speaks of and that support nothing."""
@@ -113,33 +120,32 @@ class Facts:
 
     def deficit(self, key: str) -> tuple[int, int] | None:
         """At least and at most so many, as the records have it; None for a kind that is not known here."""
-        basis = {name for r in self.requirements for name in r.get("closure", ())}
-        if not self.requirements:  # of the whole case: what its evidence is about
-            basis = {_id(v) for v in self.views}
-        within = [v for v in self.guarantees if _id(v) in basis]
-        sampled = [{support(r) in ("tested", "monitored") for r in supporting(v)} for v in within]
+        within = self.guarantees
+        own = [v for v in self.views if v["obligation"]["kind"] == "requirement"]
+        sampled = [{support(r) in ("tested", "monitored") for r in supporting(v)} for v in (*within, *own)]
         read = [{support(r) == "reviewed" for r in supporting(v)} for v in within]
         model = [{_way(r)[1] == "model" for r in supporting(v)} for v in within]
         hand = [{r["link"] != "generated" for r in supporting(v)} for v in within]
-        run = self.case["run"]["id"]
+        premises = [v for v in self.views if v["obligation"]["kind"] == "composition"]
         exact = {
+            "open": sum(v["standing"] not in (*_SUPPORTS, "argued") for v in within),
+            "premises": sum(v["standing"] not in (*_SUPPORTS, "argued") for v in premises),
             "argued": len(self.level("argued")),
             "unvalidated": sum(not r.get("validated") for r in self.requirements),
             "bounded": sum(bool(r.get("bounded")) and r["level"] in HOLDS for r in self.requirements),
-            "unowned": len(self.assumptions) - self.owned(),
+            "unowned": len(self.assumptions) - len(self.owned_ones()),
             "unrun": sum(_silent(v, method) for v in within for method, _ in v["planned"]),
             "programs": sum(v["obligation"]["kind"] == "program" and v["status"] == "not-run" for v in self.views),
             "conditional": sum(any(support(r) == "reviewed" and r["hypotheses"] for r in records(v)) for v in within),
-            "advice": sum(i["kind"] == "advice" and not i["handled"] for i in self.case["open_items"]),
+            "advice": sum(i["advice"] and not i["handled"] for i in self.case["open_items"]),
             "excused": sum(
                 len(f["obligations"]) for f in self.case["findings"] if f["how"] == "accepted" and not f["expired"]
             ),
-            "believed": sum(_id(v) in basis and any(r["run"] != run for r in records(v)) for v in self.views),
+            "believed": self.old(),
         }
         loose = {"sampled": sampled, "read": read, "models": model, "tied": hand}
         if key in exact:
-            most = exact[key]
-            return (most if self.requirements else 0), most
+            return exact[key], exact[key]
         if key in loose:
             return sum(found == {True} for found in loose[key]), sum(True in found for found in loose[key])
         if key == "single":
@@ -147,11 +153,17 @@ class Facts:
             return sum(many == 1 for many in alone), sum(many > 0 for many in alone)
         return None
 
-    def seen(self, title: str) -> set[str]:
-        """What records of the node with that title show, in the words of the page, with the bound that follows."""
-        nodes = {n["name"] for n in self.case["nodes"] if (n["title"] or n["name"]) == title}
-        found = [v for v in self.views if v["obligation"]["node"] in nodes or title == "the whole"]
+    def seen(self, before: str) -> set[str]:
+        """What the records show of the claim that a text quotes at its end, in the words of the page, with the bound
+        that follows."""
+        quoted = before.rpartition("”")[0]
+        found = [v for v in self.views if quoted.endswith(f"“{' '.join(v['obligation']['claim'].split()).rstrip('.')}")]
         return {words for v in found for r in supporting(v) for words in _seen(r)}
+
+    def searched(self, requirement: str) -> set[str]:
+        """The same of a requirement's own formula or property."""
+        own = {name for r in self.requirements if r["id"] == requirement for name in r["obligations"]}
+        return {words for v in self.views if _id(v) in own for r in supporting(v) for words in _seen(r)}
 
     def rate(self, words: str) -> str:
         """The least favourable rate of the requirements, as the page has it, from the samples of its leaves."""
@@ -181,6 +193,14 @@ def records(view: Json) -> list[Json]:
 def supporting(view: Json) -> list[Json]:
     """The records that may be relied upon: none where something refutes the claim."""
     return [record for record in records(view) if support(record) and view["status"] in _SUPPORTS]
+
+
+def _refuting(record: Json) -> str:
+    """What a refuting record found, as the page has it."""
+    found = record["counterexample"] or {"values": (), "explanation": ""}
+    values = ", ".join(f"{name} = {value}" for name, value in found["values"] if not name.startswith("("))
+    example = ": ".join(part for part in (values, found["explanation"]) if part)
+    return (example or record["summary"]) if record["verdict"] == "refuted" else ""
 
 
 def support(record: Json) -> str:
@@ -232,6 +252,8 @@ def _seen(record: Json) -> Iterator[str]:
             else _count(cases, "case")
         )
         yield f"{met}, none failed{most}"
+    if isinstance(bound.get("depth"), int):
+        yield f"searched to step {bound['depth']}, not exhaustively"
     if isinstance(bound.get("judged"), int):
         traces = bound.get("traces")
         on = f" on {_count(len(traces), 'recorded run')}" if traces and isinstance(traces, dict | list) else ""

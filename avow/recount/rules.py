@@ -24,12 +24,14 @@ _SORTS = {
     "trusted tools": "tools",
 }
 _DEFICITS = {
+    "guarantees? without support": "open",
+    "premises? of the composition without support": "premises",
     "argued, not derived": "argued",
     "sentences? without a validation": "unvalidated",
     "guarantees? shown of a model only": "models",
     "requirements? within bounds only": "bounded",
-    "assumptions? without owner or date": "unowned",
-    "guarantees? sampled, not proved": "sampled",
+    "assumptions? without owner or end": "unowned",
+    "claims? sampled, not proved": "sampled",
     "guarantees? on a person's reading only": "read",
     "guarantees? with one method only": "single",
     "guarantees? translated by a person for the tool": "tied",
@@ -55,7 +57,8 @@ def _rule(section: str, pattern: str, numbers: Callable[[Facts, re.Match[str], B
 
 
 def _gates(facts: Facts, _match: re.Match[str], _block: Block) -> _Numbers:
-    return str(sum(g["passed"] for g in facts.gates)), str(len(facts.gates))
+    idle = len(facts.case["gates"]) - len(facts.gates)
+    return str(sum(g["passed"] for g in facts.gates)), str(len(facts.gates)), str(idle) if idle else None
 
 
 def _level(facts: Facts, match: re.Match[str], _block: Block) -> _Numbers:
@@ -126,7 +129,7 @@ def _named(facts: Facts, match: re.Match[str], _block: Block) -> _Numbers:
 
 def _hazard(facts: Facts, match: re.Match[str], _block: Block) -> _Numbers:
     """A hazard's row: its name beside its text, its mitigations, and one of them that is shown no further than it."""
-    hazard = next((h for h in facts.case["hazards"] if " ".join(h["hazard"]["text"].split()) == match[2]), None)
+    hazard = next((h for h in facts.hazards if " ".join(h["hazard"]["text"].split()) == match[2]), None)
     if hazard is None:
         return None
     least = [m["name"] for m in hazard["mitigations"] if m["level"] == hazard["level"]]
@@ -134,11 +137,10 @@ def _hazard(facts: Facts, match: re.Match[str], _block: Block) -> _Numbers:
 
 
 def _seen(facts: Facts, match: re.Match[str], block: Block) -> _Numbers:
-    """What was seen, with its bound: as a record of the node says that is named before it."""
-    titles = [n["title"] or n["name"] for n in facts.case["nodes"]] + ["the whole"]
+    """What was seen, with its bound: as a record says of the claim that is quoted before it; in the row of a
+    requirement, of its own formula."""
     before = match.string[: match.start()]
-    title = max(titles, key=lambda t: before.rfind(t)) if titles else ""
-    told = facts.seen(title)
+    told = facts.searched(_cells(block.text)[0]) if block.section == "q1" else facts.seen(before)
     words = match[1][:1].lower() + match[1][1:]
     return (match[1],) if words in told else ("; ".join(sorted(told)) or "nothing",)
 
@@ -170,8 +172,11 @@ def _listed(facts: Facts, match: re.Match[str], _block: Block) -> _Numbers:
     if match.group().startswith("On it"):
         claim = facts.case["answers"]["weakest"]["claim"]
         of = [r["id"] for r in facts.requirements if claim in r.get("closure", ())]
-    elif match.group().startswith("Refuted"):
+        of += [h["hazard"]["id"] for h in facts.hazards if claim in h.get("closure", ())]
+    elif "efuted" in match.group():
         of = facts.level("refuted")
+    elif match.group().startswith("Requirements"):
+        of = facts.level("not shown")
     names = ", ".join(" ".join(name.split()) for name in of[:shown])
     return names, str(len(of) - shown) if len(of) > shown else None
 
@@ -231,6 +236,7 @@ _STATUS += "|stale|missing|unsupported|circular|refuted|contradictory"
 _BOUND = r"(?:, with no bound on failures| \([^()]*: at most [\d.]+ % fail\))?"
 _SEEN = r"[Oo]bserved \d+ times?(?: on \d+ recorded runs?)?, none against it"
 _SEEN += rf"|(?:[Oo]nly )?\d+ of \d+ cases? met its condition, none failed{_BOUND}|\d+ cases?, none failed{_BOUND}"
+_SEEN += r"|searched to step \d+, not exhaustively"
 _SEEN += rf"|\d+ (?:triggered )?runs?(?: of \d+)?, \d+ failed(?:; the worst stratum: [^()]*)?{_BOUND}"
 
 _WHY = r"fails\. (.*?)(?:; and (\d+) more)?(?=\.? Next:|\.? $)"
@@ -247,20 +253,21 @@ RULES = (
     _rule("", r"(\d+) kinds? of assurance deficit", _kinds),
     _rule("head", r"Refuted: ([^␟]*?)(?: and (\d+) more)?(?=; | $| · |[ ,] ?\d| WARNED)", _listed),
     _rule("q6", r"All (\d+) kinds?", _kinds),
-    _rule("head", r"policy: (\d+) of (\d+) gates? pass", _gates),
+    _rule("head", r"policy: (\d+) of (\d+) gates? pass(?:es)?(?:, (\d+) not asked)?", _gates),
     _rule("head", rf"(\d+) ({_LEVELS})(?= [·␟]|, | $)", _level),
     _rule("q1", rf"^ ␟ (\d+) ({_LEVELS}) ␟ (.*?) $", _named),
     _rule("q1", r"^ (␟ .* ␟ )(\d+) $", _row),
     _rule("q2", rf"(\d+) ({_STATUS})\b", _basis),
     _rule("q2", r"and (\d+) nodes? on no less", _whole(lambda f: len(f.case["nodes"]) - 8)),
-    _rule("q3", r"and (\d+) more claims?", _whole(lambda f: len(f.wrong()) - 1)),
+    _rule("q3", r"and (\d+) more claims?", _whole(lambda f: len(f.wrong()) - min(3, f.wronged()))),
     _rule("q3", r"On it rests? ([^␟;]*?)(?: and (\d+) more)?(?=\.? $|;)", _listed),
-    _rule("q3", r"Open: ([^␟]*?)(?: and (\d+) more)?(?=\. $)", _listed),
+    _rule("q3", r"Requirements (?:refuted|not shown): ([^␟]*?)(?: and (\d+) more)?(?=\. )", _listed),
     _rule("q3", r"; (\d+) on other guarantees of this node", _beside),
     _rule("q4", r"also ((?:A\d+(?: to A\d+)?(?:, )?)+)", _others),
     _rule("q4", rf"(\d+) about ({'|'.join(_SORTS)})\b", _sort),
-    _rule("q4", r"(\d+) of (\d+) with owner and date", lambda f, _m, _b: (str(f.owned()), str(len(f.assumptions)))),
+    _rule("q4", r"(\d+) of (\d+) with owner and last day", lambda f, _m, _b: (str(f.owned()), str(len(f.assumptions)))),
     _rule("q4", r"([^,:]+?) \((\d+)\)(?=[,;.]| and )", _owners),
+    _rule("q4", r"until a text changes: (\d+)", _whole(lambda f: len(f.owned_ones()) - f.owned())),
     _rule("q4", rf"assumed since {_DAY}(?: to {_DAY})?", _days),
     _rule("q4", rf"(?:until|the first ends) {_DAY}", _days),
     _rule("q4", r"\bA(\d+)(?= )", _says),
@@ -287,7 +294,6 @@ RULES = (
         "signature", r"the digest ([0-9a-f]+)…", lambda _f, m, _b: m.groups()
     ),  # `avow sign` and the audit compute it
     _rule("head", r"(\d+) answers? from earlier runs", _whole(Facts.old)),
-    _rule("head", r"^ and (\d+) more $", _whole(lambda f: len(f.failing) - 2)),
     _rule("head", _WHY, _reasons),
     _rule("gates", _WHY, _reasons),
     _rule("head", r"SHA-(256)", lambda _f, m, _b: m.groups()),

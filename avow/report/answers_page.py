@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from typing import Any
 from urllib.parse import quote
 
-from markupsafe import Markup, escape
+from markupsafe import Markup
 
 from avow.assurance.answers import MEANINGS, Assumption, Level, NodeBasis, SupposedLine, Tone
 from avow.assurance.changes import baseline_of
@@ -147,12 +147,8 @@ def _word(record: Evidence) -> str:
 
 
 def _refuted(text: str) -> Markup:
-    """The text of a refutation, with its quotation marked up."""
-    before, mark, rest = text.partition("“")
-    quote, end, after = rest.rpartition("”")
-    if not mark or not end:
-        return escape(text)
-    return Markup('<b>{}</b> <span class="said">“{}”</span>{}').format(before.strip(), quote, after)
+    """The text of a refutation: all but its first word is of the contract and its evidence."""
+    return Markup('<b>Refuted:</b> <span class="said">{}</span>').format(text.removeprefix("Refuted: "))
 
 
 def render_index(cases: Sequence[Case], earlier: Sequence[str] = ()) -> str:

@@ -170,7 +170,7 @@ def _first(case: Case) -> dict[str, Any]:
                 {"word": f"{r.tone.mark} {r.level}", "tone": r.tone.value},
                 f"{r.weakest_evidence.status}: {r.weakest_evidence.title}" if r.weakest_evidence else "none",
                 str(len(r.supposes)),
-                r.rate.brief if r.rate and r.rate.bound and r.level.holds else "",
+                r.noted,
             ]
             for r in case.listed
         ],
@@ -179,7 +179,7 @@ def _first(case: Case) -> dict[str, Any]:
         "more_nodes": a.more_nodes,
         "objects": f"{a.objects}." if a.objects else "",
         "weakest": a.refuted or _weakest(case),
-        "deficits": [f"{w.count} {w.words}" for w in case.deficits[:6]] or ["No deficit is known."],
+        "deficits": [f"{w.count} {w.words}" for w in case.deficits] or ["No deficit is known."],
         "trusted": [f"{t.what[:1].upper()}{t.what[1:]} ({t.which}): {t.mitigation}." for t in a.trusted],
         "next": f"Next weakest: {a.next_weakest}." if a.next_weakest and not a.refuted else "",
         "supposed": [[line.about, *_supposed(case, line)] for line in a.supposed],
@@ -202,7 +202,7 @@ def _supposed(case: Case, line: SupposedLine) -> tuple[str, str]:
 
 def _owned(case: Case) -> str:
     a = case.answers
-    return f"{a.owned} with owner and date{a.owners and ': '}{a.owners}." if a.owned else "Nothing."
+    return f"{a.owned} with owner and last day{a.owners and ': '}{a.owners}." if a.owned else "Nothing."
 
 
 def _weakest(case: Case) -> str:

@@ -359,7 +359,7 @@ def test_what_is_lost_with_a_claim_is_no_gain() -> None:
     assert "better" not in kinds
     proved = case(subject(PROSE), GUARANTEES, [evidence(g) for g in GUARANTEES], baseline=signed).changes.entries
     assert {e.kind for e in proved} == {"better"}
-    assert "guarantee sampled, not proved: 1 → none" in {e.words for e in proved}
+    assert "claim sampled, not proved: 1 → none" in {e.words for e in proved}
 
 
 def test_what_means_something_else_shows_both_formulas() -> None:
@@ -378,6 +378,14 @@ def test_the_first_screen_of_a_full_case_is_in_plain_words() -> None:
     own = [a.verdict, a.counts, a.weakened, a.gates, a.owned, a.signed, *(b.words for b in a.based_on)]
     own += [b.title for b in a.based_on]
     assert [name for text in own for name in identifiers(text)] == []
+    first, whole, _ = a.refuted.split("; ")
+    assert first.startswith("Refuted: navigation: “")
+    assert first.endswith("(run = 31, distance_m = 0.43: outside of the tolerance of 0.25 m)")
+    assert whole.startswith("the whole: “REQ4")  # one of the whole system is not among "more claims"
+    assert a.refuted.endswith(" Requirements refuted: REQ4. Requirements not shown: REQ1, REQ2.")
+    assert {r.id: r.weakest_evidence.status for r in rover_case().requirements if r.weakest_evidence}[
+        "REQ4"
+    ] == "refuted"
 
 
 def test_which_assumptions_there_are_and_who_answers_for_them_is_said_in_a_line() -> None:
@@ -392,6 +400,8 @@ def test_which_assumptions_there_are_and_who_answers_for_them_is_said_in_a_line(
     assert _owners(said) == "A. Person (4), B (2); the first ends 2027-01-01"
     assert _owners(said[:1]) == "A. Person, until 2027-01-01"
     assert _owners([replace(said[0], who="")]) == ""
+    validated = replace(said[0], sort=Sort.MEANING, until="")
+    assert _owners([said[1], validated]) == "A. Person; the first ends 2027-01-02; until a text changes: 1"
     made = [replace(one, date=f"2026-11-{20 + at}") for at, one in enumerate(said[:2])]
     assert _owners(made[:1]) == "A. Person, assumed since 2026-11-20, until 2027-01-01"
     assert _owners(made) == "A. Person, assumed since 2026-11-20 to 2026-11-21; the first ends 2027-01-01"
@@ -409,6 +419,25 @@ def test_deficits_are_named_and_counted_on_the_first_screen() -> None:
         said = [deficit_words(key, many) for key in _WORDS]
         assert not any("{" in words for words in said)
     assert deficit_words("conditional", 1) == "review with conditions"
+
+
+def test_deficits_are_of_all_that_the_page_shows() -> None:
+    """Also of a guarantee that no requirement needs, of a premise without a reason, of a requirement that was searched,
+    of remarks of any kind, and of each earlier answer once."""
+    premise = obligation(SYSTEM_LEVEL, Kind.COMPOSITION, "whole.persistence")
+    remark = {"code": "HOARE410", "place": "p.imp:2", "message": "the program compares with 10"}
+    listed = [
+        evidence(GUARANTEES[0], details={"remarks": [remark]}),
+        evidence(GUARANTEES[1], Verdict.UNKNOWN, run="earlier"),
+        evidence(premise, Verdict.UNKNOWN, "compose", summary="the plan gives no reason for it"),
+        evidence(OWN, Verdict.TESTED, "compose", bound={"depth": 52}),
+    ]
+    needs_one = replace(FORMAL, supported_by=("a.g",))
+    found = case(subject(needs_one), [*GUARANTEES, premise, replace(OWN, clauses=("a.g",))], listed)
+    number = {d.key: d.count for d in found.deficits}
+    expected = {"open": 2, "premises": 1, "models": 1, "sampled": 1, "advice": 1, "believed": 1}
+    assert {key: number.get(key) for key in expected} == expected
+    assert found.requirements[0].searched == "searched to step 52, not exhaustively"
 
 
 @pytest.mark.parametrize(
@@ -453,9 +482,13 @@ def test_requirements_on_another_guarantee_of_the_weakest_node_are_counted_besid
     node = [guarantee("a", "g"), guarantee("a", "h")]
     asked = [replace(PROSE, id=name, supported_by=(f"a.{g}",)) for name, g in (("R1", "g"), ("R2", "h"), ("R3", "h"))]
     made = [evidence(g, Verdict.TESTED, "hypothesis", bound=drawn(b)) for g, b in zip(node, (0.5, 0.1), strict=True)]
-    found = case(system({"a": ["g", "h"]}, requirements=asked), node, made).answers.weakest
+    danger = Hazard("H", "It burns", "critical", mitigated_by=("a",))
+    whole = case(system({"a": ["g", "h"]}, requirements=asked, hazards=[danger]), node, made)
+    found = whole.answers.weakest
     assert found is not None
-    assert (found.needed_by, found.others) == (("R1",), "; 2 on other guarantees of this node")
+    assert (found.needed_by, found.others) == (("R1", "H"), "; 2 on other guarantees of this node")
+    assert whole.answers.next_weakest.startswith("a: “a meets h”: 10 cases")
+    assert whole.answers.verdict == "Argued (no failure rate)"
     alone = case(system({"a": ["g"]}, requirements=asked[:1]), node[:1], made[:1]).answers.weakest
     assert alone is not None
     assert alone.others == ""

@@ -334,7 +334,8 @@ def test_the_index_does_not_call_known_bad_material_passed() -> None:
     for name in ("index.html", "report.md", "comment.md", "gsn.yaml"):
         assert "WARNED: 1 finding known" in str(made[name]), name
     assert any("WARNED: 1 finding known" in line for line in terminal_lines(examined))
-    assert examined.answers.tone is Tone.AMBER
+    assert (examined.answers.tone, good.answers.tone) == (Tone.RED, Tone.GREY)
+    assert examined.answers.gates.endswith(" not asked")
     assert "✔" not in text.split("<main")[0]
     relied = case(system({"n": ["g"]}, requirements=[Requirement("R", "t", None, None, ("n.g",))]), [g], [evidence(g)])
     assert "1 system, argued; 1 only examined" in render_index([examined, relied])

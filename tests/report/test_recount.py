@@ -15,7 +15,7 @@ from assurance.sample import evidence, guarantee, system
 from assurance.test_rates import sampled, three
 
 from avow.assurance.model import Case
-from avow.base.verdict import Verdict
+from avow.base.verdict import Counterexample, Verdict
 from avow.evidence.ledger import Ledger
 from avow.kernel.rates import tail
 from avow.pipeline.report_check import check
@@ -24,6 +24,7 @@ from avow.recount.__main__ import main
 from avow.recount.facts import upper
 from avow.recount.page import blocks
 from avow.report import formats, render_all
+from avow.system.plan import Finding
 from report.test_answers_page import CASES as PAGES
 from report.test_answers_page import REPORTS
 
@@ -32,7 +33,15 @@ def with_a_rate() -> Case:
     return three(sampled("a.g"), sampled("b.g", "0.049", 60), sampled("c.g"))
 
 
-CASES: dict[str, Callable[[], Case]] = {"rate": with_a_rate, **PAGES}  # type: ignore[dict-item]
+def examined() -> Case:
+    """A refutation that the plan expects, with a counterexample to be cut; gates that are not asked."""
+    target = guarantee("n", "g")
+    subject = system({"n": ["g"]}, policy="reproduction", expected=[Finding("n/guarantee/g", "refuted")])
+    values = tuple((f"in.x{at}", str(at)) for at in range(20))
+    return make_case(subject, [target], [evidence(target, Verdict.REFUTED, counterexample=Counterexample(values))])
+
+
+CASES: dict[str, Callable[[], Case]] = {"rate": with_a_rate, "examined": examined, **PAGES}  # type: ignore[dict-item]
 
 
 @cache
@@ -63,7 +72,7 @@ def test_a_true_page_is_borne_out(name: str) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["rover", "large", "rate"])
+@pytest.mark.parametrize("name", ["rover", "large", "rate", "examined"])
 def test_any_changed_number_is_found(name: str) -> None:
     page, data = made(name)
     seeded = list(changed(page))
