@@ -11,6 +11,7 @@ import pytest
 from assurance.sample import case as make_case
 from assurance.sample import evidence, guarantee, node_plan, rover_case, system
 
+from avow.assurance.answers import Failure
 from avow.assurance.codec import read_case
 from avow.assurance.model import Case
 from avow.base.verdict import Verdict
@@ -136,7 +137,10 @@ def test_faults_of_layout_are_found(tmp_path: Path) -> None:
     pages = {"picture": render_argument(rover_case())}
     text = render_answers(rover_case())
     asked = {key: (pages.get(key, text).replace("</style>", css + "</style>"), 420) for key, (css, _) in FAULTS.items()}
-    measured = measure(asked, tmp_path)
+    failure = Failure("A gate", f"system/composition/{'Agent.' * 12}persistence", "")
+    wide = replace(rover_case(), answers=replace(rover_case().answers, failures=(failure,)))
+    measured = measure({**asked, "wide": (render_answers(wide), 320)}, tmp_path)
+    assert measured["wide"]["closed"] == [], "a long name is broken"
     assert [fault for fault in FAULTS if not measured[fault][FAULTS[fault][1]]] == []
 
 
