@@ -294,12 +294,7 @@ class _Solver:
             found = further(frame, asked, self.bounds.effort, self.bounds.seed, str(condition.about))
         if found.proved is not None:
             case = Case(
-                Phase.LATER,
-                Verdict.PROVED,
-                found.proved,
-                engine=found.engine,
-                depth=found.steps,
-                invariant=found.by,
+                Phase.LATER, Verdict.PROVED, found.proved, engine=found.engine, depth=found.steps, invariant=found.by
             )
         elif found.run is not None:
             case = replace(later, counterexample=found.run)

@@ -115,7 +115,7 @@ def implied(
     cached refutation has no counterexample, and is used only if it matters only `whether` the goal is proved."""
     kept = _kept.get()
     if kept is None:
-        return _implied(hypotheses, goal, effort, seed)
+        return _implied(hypotheses, goal, effort, seed, whether)
     asked = [[label, digest(term)] for label, term in hypotheses.items()]
     mark = sha256(json.dumps([asked, digest(goal), effort, seed]))
     match kept.find(mark):
@@ -124,7 +124,7 @@ def implied(
         case NotProved(verdict=verdict) if whether:
             return Entailment(verdict)
     kept.asked += 1
-    answer = _implied(hypotheses, goal, effort, seed)
+    answer = _implied(hypotheses, goal, effort, seed, whether)
     if answer.verdict is Verdict.PROVED:
         kept.now[mark] = answer.needed, answer.vacuous
     elif answer.verdict is Verdict.REFUTED:
@@ -133,17 +133,17 @@ def implied(
 
 
 @new_session()
-def _implied(hypotheses: Mapping[str, Term], goal: Term, effort: int, seed: int) -> Entailment:
+def _implied(hypotheses: Mapping[str, Term], goal: Term, effort: int, seed: int, whether: bool) -> Entailment:
     quick = min(QUICK_EFFORT, effort)
-    answer = entails(hypotheses, goal, effort=quick, seed=seed)
+    answer = entails(hypotheses, goal, effort=quick, seed=seed, whether=whether)
     if answer.verdict is not Verdict.UNKNOWN:
         return answer
     opened, witnesses = _opened(hypotheses)
     for stronger in _witnessed(goal, witnesses):
-        found = entails(opened, stronger, effort=quick, seed=seed)
+        found = entails(opened, stronger, effort=quick, seed=seed, whether=True)
         if found.verdict is Verdict.PROVED:
             return found
-    return entails(hypotheses, goal, effort=effort, seed=seed) if effort > quick else answer
+    return entails(hypotheses, goal, effort=effort, seed=seed, whether=whether) if effort > quick else answer
 
 
 def _opened(hypotheses: Mapping[str, Term]) -> tuple[dict[str, Term], list[tuple[Variable, ...]]]:

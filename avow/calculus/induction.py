@@ -243,9 +243,9 @@ def _inductive(frame: Frame, asked: Steps, found: Term, effort: int, seed: int) 
     if written is None:
         return None
     held = {label(written) + _BEFORE: asked.shifted(found, 1)}
-    first = implied({**asked.ever, **asked.initial}, found, effort=effort, seed=seed)
-    kept = implied({**asked.ever, **held}, found, effort=effort, seed=seed)
-    later = implied({**asked.last, **held}, asked.claim, effort=effort, seed=seed)
+    first = implied({**asked.ever, **asked.initial}, found, effort=effort, seed=seed, whether=True)
+    kept = implied({**asked.ever, **held}, found, effort=effort, seed=seed, whether=True)
+    later = implied({**asked.last, **held}, asked.claim, effort=effort, seed=seed, whether=True)
     if {first.verdict, kept.verdict, later.verdict} != {Verdict.PROVED}:
         return None
     # hypotheses of preservation are about the step before

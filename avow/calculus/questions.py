@@ -135,12 +135,7 @@ def _side_answer(frame: Frame, settled: Settled, repairs: Sequence[tuple[Phase, 
         "needed": list(settled.needed),
         "trivial": settled.trivial,
         "cases": [
-            {
-                "phase": c.phase.value,
-                "verdict": c.verdict.value,
-                "needed": list(c.needed),
-                "engine": c.engine,
-            }
+            {"phase": c.phase.value, "verdict": c.verdict.value, "needed": list(c.needed), "engine": c.engine}
             for c in settled.cases
         ],
     }
@@ -154,12 +149,7 @@ def _side_answer(frame: Frame, settled: Settled, repairs: Sequence[tuple[Phase, 
         details["circle"] = list(settled.circle)
         return Answer(Verdict.REFUTED, f"{summary}; {hint}", Counterexample(explanation=summary), details=details)
     if bad is None:
-        return Answer(
-            Verdict.PROVED,
-            _why(frame, settled),
-            details=details,
-            vacuous=settled.vacuous,
-        )
+        return Answer(Verdict.PROVED, _why(frame, settled), details=details, vacuous=settled.vacuous)
     if bad.verdict is Verdict.REFUTED or bad.counterexample is not None:
         fails = bad.verdict is not Verdict.REFUTED
         summary = _induction_fails(condition, bad) if fails else _why_not(condition, bad)
@@ -387,7 +377,7 @@ class EnvironmentQuestion:
                     if not set(about) & set(ports_of(situation)):
                         continue
                     known = frame.contracts((node,)) | environment
-                    answer = implied(known, negation(situation), effort=DEFEAT_EFFORT)
+                    answer = implied(known, negation(situation), effort=DEFEAT_EFFORT, whether=True)
                     if answer.verdict is Verdict.PROVED and self.label in answer.needed:
                         yield f"{node}.{guarantee.name}"
 

@@ -132,10 +132,12 @@ class FormulaQuestion:
         goal = system_term(frame, self.formula)
         delayed = bool(frame.memory(of=self.name)) or any(edge.delayed for edge in frame.graph.edges)
         last: Entailment | None = None
+        # Induction includes a proof at one step.
+        glance = replace(bounds, effort=min(CONSISTENT_EFFORT, bounds.effort)) if delayed else bounds
         for clauses in dict.fromkeys((everything,) if patient else (self.support, everything)):
             if (everything and not clauses) or (patient and delayed):
                 continue
-            last = self.ask(self.known(frame, clauses), goal, bounds)
+            last = self.ask(self.known(frame, clauses), goal, glance, whether=delayed or clauses != everything)
             if last.verdict is Verdict.PROVED:
                 return self.proved(composition, (last,), Phase.SAME_STEP, bounds)
         if delayed:
@@ -184,7 +186,7 @@ class FormulaQuestion:
         later = first
         # Usually the formula alone is inductive; without the contracts one step before, the query is quick.
         for earlier in (itself | before,) if patient else (itself, itself | before):
-            later = self.ask(now | earlier, goal, bounds)
+            later = self.ask(now | earlier, goal, bounds, whether=earlier is itself)
             if later.verdict is Verdict.PROVED:
                 return self.proved(composition, (first, later), Phase.LATER, bounds)
         if later.verdict is not Verdict.REFUTED:
@@ -225,8 +227,8 @@ class FormulaQuestion:
                 found[f"{node}.{name}{' one step before' if earlier else ''}"] = frame.clause(node, name, earlier)
         return found | frame.environment(earlier) | frame.memory(earlier, self.name)
 
-    def ask(self, hypotheses: Mapping[str, Term], goal: Term, bounds: Bounds) -> Entailment:
-        return implied(hypotheses, goal, effort=bounds.effort, seed=bounds.seed)
+    def ask(self, hypotheses: Mapping[str, Term], goal: Term, bounds: Bounds, whether: bool = False) -> Entailment:
+        return implied(hypotheses, goal, effort=bounds.effort, seed=bounds.seed, whether=whether)
 
     def proved(
         self,
@@ -256,12 +258,7 @@ class FormulaQuestion:
         if shown and not fallen:  # otherwise it was found with hypotheses that may not be used
             details["invariants"] = shown
             summary += f"; by an invariant that was found: {' and '.join(shown)}"
-        answer = Answer(
-            Verdict.PROVED,
-            summary,
-            details=details,
-            vacuous=any(answer.vacuous for answer in answers),
-        )
+        answer = Answer(Verdict.PROVED, summary, details=details, vacuous=any(answer.vacuous for answer in answers))
         return certified(answer, found, late=composition.certificates.late, fallen=fallen)
 
     def not_proved(self, answer: Entailment, when: str = "") -> Answer:
@@ -367,7 +364,7 @@ def _formula_says_nothing(
     effort = min(CONSISTENT_EFFORT, bounds.effort)
 
     def proves(hypotheses: Mapping[str, Term], goal: Term) -> tuple[str, ...] | None:
-        found = implied(hypotheses, goal, effort=effort, seed=bounds.seed)
+        found = implied(hypotheses, goal, effort=effort, seed=bounds.seed, whether=True)
         return found.needed if found.verdict is Verdict.PROVED else None
 
     goal = system_term(frame, formula)
@@ -425,7 +422,7 @@ def _possible(
     terms = [system_term(frame, state.term) for state in states]
     wanted = {f"state {k}": t if v else negation(t) for k, (t, v) in enumerate(zip(terms, values, strict=True))}
     effort = min(CONSISTENT_EFFORT, bounds.effort)
-    return solve({**assumed, **wanted}, effort=effort, seed=bounds.seed, values="unused").status != "unsat"
+    return solve({**assumed, **wanted}, effort=effort, seed=bounds.seed, values="never").status != "unsat"
 
 
 def _without_demand(formula: Property) -> Iterator[tuple[str, Property]]:

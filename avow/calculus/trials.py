@@ -35,7 +35,8 @@ def _beyond(frame: Frame, node: Node, clause: str, asked: tuple[Term, ...]) -> b
     given = {a.name: frame.clause(node.name, a.name) for a in node.assumptions}
 
     def meets(condition: Term, claim: Term) -> bool:
-        return implied({**given, "": condition}, claim, effort=CONSISTENT_EFFORT).verdict is Verdict.PROVED
+        found = implied({**given, "": condition}, claim, effort=CONSISTENT_EFFORT, whether=True)
+        return found.verdict is Verdict.PROVED
 
     for seen in [part for condition in asked if (part := _seen(condition, own)) != TRUE]:
         tried = any(meets(condition, seen) for condition in met)

@@ -108,7 +108,7 @@ def implied(stronger: Formulas, weaker: Formulas, *, effort: int, seed: int = 0)
 
 def _implies(one: t.Term, other: t.Term, effort: int, seed: int) -> bool:
     def proved(left: t.Term, right: t.Term) -> bool:
-        return entails([left], right, effort=effort, seed=seed).verdict is Verdict.PROVED
+        return entails([left], right, effort=effort, seed=seed, whether=True).verdict is Verdict.PROVED
 
     pushed = push_negations(other) if depth(other) <= REWRITTEN_DEPTH else other
     return proved(pushed, other) if _is_instance(one, pushed) else proved(one, other)

@@ -58,11 +58,11 @@ def remedy(
     together = {**hypotheses, "the remedy": found}
     if len(together) == len(hypotheses) or solve(together, effort=effort).status != "sat":
         return None
-    if entails(together, goal, effort=effort).verdict is not Verdict.PROVED:
+    if entails(together, goal, effort=effort, whether=True).verdict is not Verdict.PROVED:
         return None
     # Weaker than every sufficient assumption, as far as the hypotheses leave a difference.
     context = [h for h in hypotheses.values() if free_variables(h) <= frozenset(about)]
-    weakest = entails([*context, exact], found, effort=effort).verdict is Verdict.PROVED
+    weakest = entails([*context, exact], found, effort=effort, whether=True).verdict is Verdict.PROVED
     return Remedy(found, weakest)
 
 
@@ -120,12 +120,12 @@ def _simplified(term: t.Term, hypotheses: Mapping[str, t.Term], goal: t.Term, ef
         for part in tuple(parts):
             rest = [p for p in parts if p is not part]
             # Weaken an alternative as far as it still suffices.
-            if entails([*known, *rest], goal, effort=limit).verdict is Verdict.PROVED:
+            if entails([*known, *rest], goal, effort=limit, whether=True).verdict is Verdict.PROVED:
                 parts = rest
         kept.append(conjunction(parts))
     for one in tuple(kept):
         others = [k for k in kept if k is not one]
-        if others and entails([*known, one], disjunction(others), effort=limit).verdict is Verdict.PROVED:
+        if others and entails([*known, one], disjunction(others), effort=limit, whether=True).verdict is Verdict.PROVED:
             kept = others
     return disjunction(kept)
 

@@ -75,22 +75,22 @@ class Entailment:
     seconds: float = 0.0
 
 
-Values = OneOf["shown", "if any", "unused"]
+Values = OneOf["shown", "if any", "unused", "never"]
 """The use of a solution's values: shown to people, with small numbers; the same, but they may be missing (polynomials
-can have solutions without an exact decimal); or not used."""
+can have solutions without an exact decimal); or not used. With `never` only a contradiction matters: the solver's own
+`sat` ends the search, and is not replayed."""
 
 
 @dataclass(frozen=True, slots=True)
 class _Asked:
-    """A question: see `solve`. `free`: the variables whose values are wanted; `small`: with small numbers, if such
-    values exist."""
+    """A question: see `solve`. `free`: the variables whose values are wanted."""
 
     labelled: Mapping[str, Term]
     free: tuple[Variable, ...]
     given: Mapping[Variable, Value]
     effort: int
     seed: int
-    small: bool
+    values: Values
 
     def fixed(self, translator: Translator) -> dict[Variable, Meaning]:
         """The given values, as meanings."""
@@ -128,7 +128,7 @@ def solve(
         if not allowed(effort):
             return Solution("unknown", reason=NO_ANSWER)
         fixed = {v: given[v] for v in _in_order(given)} if given else {}
-        asked = _Asked(labelled, free, fixed, effort, seed, values != "unused")
+        asked = _Asked(labelled, free, fixed, effort, seed, values)
         try:
             solution = _within_bounds(asked) or _solve(Translator(), asked)
         except Unsupported as error:
@@ -152,8 +152,10 @@ def entails(
     seed: int = 0,
     variables: Iterable[Variable] = (),
     given: Mapping[Variable, Value] | None = None,
+    whether: bool = False,
 ) -> Entailment:
-    """Do the hypotheses imply the goal, for all values of the free variables?"""
+    """Do the hypotheses imply the goal, for all values of the free variables? `whether`: only a proof matters, and
+    `refuted` means that the solver has a model, which is neither replayed nor shown."""
     labelled = (
         dict(hypotheses) if isinstance(hypotheses, Mapping) else {f"H{k}": h for k, h in enumerate(hypotheses, start=1)}
     )
@@ -161,14 +163,16 @@ def entails(
     while denied in labelled:
         denied += "!"
     asked = {**labelled, denied: negation(goal)}
-    solution = solve(asked, effort=effort, seed=seed, variables=variables, given=given)
+    values: Values = "never" if whether else "shown"
+    solution = solve(asked, effort=effort, seed=seed, variables=variables, given=given, values=values)
     match solution.status:
         case "unsat":
             needed = tuple(label for label in solution.core if label != denied)
             vacuous = bool(solution.core) and denied not in solution.core
             found = Entailment(Verdict.PROVED, needed=needed, vacuous=vacuous)
         case "sat":
-            found = Entailment(Verdict.REFUTED, Counterexample(show_values(solution.values)), solution.values)
+            shown = None if whether else Counterexample(show_values(solution.values))
+            found = Entailment(Verdict.REFUTED, shown, solution.values)
         case "unknown":
             found = Entailment(Verdict.UNKNOWN, reason=solution.reason)
         case _:
@@ -194,7 +198,7 @@ def _solve(translator: Translator, question: _Asked) -> Solution:
 
     def replayed(answer: Answer, engine: str, *, simple: bool) -> Solution | None:
         """The values of its model, if they can be read and replayed."""
-        for smaller in (True,) if question.small else (False, True):
+        for smaller in (False, True) if question.values == "unused" else (True,):
             one = with_small_numbers(translator, whole, numbers, answer, seed=seed) if smaller else answer
             values = _read(one.model, free) if one.model is not None else None
             if values is None or (simple and not all(map(_is_simple, values.values()))):
@@ -209,6 +213,8 @@ def _solve(translator: Translator, question: _Asked) -> Solution:
         name = "z3" if engine == "smt" else "z3, qsat"
         if answer.status == "unsat":
             return answer, Solution("unsat", core=answer.core, engine=name)
+        if question.values == "never":
+            return answer, Solution("sat", engine=name) if answer.status == "sat" else None
         return answer, replayed(answer, name, simple=engine == "smt")
 
     reason = ""
@@ -226,7 +232,8 @@ def _solve(translator: Translator, question: _Asked) -> Solution:
         if functions:
             limit = max(1, int(effort * tables))
             found = search_tables(translator, build, ordinary, functions, effort=limit, seed=seed)
-            if found is not None and replay(labelled.values(), {**found, **given}):
+            never = question.values == "never"
+            if found is not None and (never or replay(labelled.values(), {**found, **given})):
                 return Solution("sat", found, engine="z3, functions as tables")
             solution = replayed(answer, "z3", simple=False)
         else:
@@ -241,7 +248,7 @@ def _solve(translator: Translator, question: _Asked) -> Solution:
 def _within_bounds(asked: _Asked) -> Solution | None:
     """If there are sequences or divisions: values for which nothing outside a sequence matters, and no division by
     zero. Sequences are encoded as functions; if these formulas are contradictory, so are the original ones."""
-    labelled = asked.labelled
+    labelled, proof = asked.labelled, asked.values == "never"
     if not any(is_partial(formula) for formula in labelled.values()):
         return None
     inside = conjunction(map(defined, labelled.values()))
@@ -250,8 +257,8 @@ def _within_bounds(asked: _Asked) -> Solution | None:
     formulas = flat.formulas if flat else {**labelled, _INSIDE: inside}
     variables = _in_order(flat.variables(asked.free)) if flat else asked.free
     translator, within = Translator(), replace(asked, labelled=formulas, free=variables, effort=asked.effort // 3)
-    found = _solve(translator, within)
-    if found.status == "sat":
+    found = None if proof else _solve(translator, within)
+    if found is not None and found.status == "sat":
         values = flat.values(found.values) if flat else found.values
         if values is not None and replay(labelled.values(), {**values, **asked.given}):
             return Solution("sat", values, engine=found.engine)

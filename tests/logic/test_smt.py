@@ -13,6 +13,7 @@ from avow.formulas.values import FunctionValue
 from avow.formulas.written import show_values
 from avow.language.sorts import BOOL, STRING, OpaqueSort
 from avow.language.terms import Compare, Literal, Not, Quantified, Quantifier, Role, Term, Variable
+from avow.solving import questions
 from avow.solving.questions import Entailment, entails, solve
 from avow.solving.replay import replay
 
@@ -33,8 +34,8 @@ def say(text: str) -> Term:
     return formula(text, NODE, CONTRACT)
 
 
-def ask(hypothesis: str, goal: str) -> Entailment:
-    return entails({"H": say(hypothesis)}, say(goal), effort=10_000)
+def ask(hypothesis: str, goal: str, *, whether: bool = False) -> Entailment:
+    return entails({"H": say(hypothesis)}, say(goal), effort=10_000, whether=whether)
 
 
 TRUE_ALWAYS = [
@@ -91,6 +92,14 @@ def test_division_by_zero_never_makes_a_counterexample() -> None:
     # false only under some interpretations of 1 / 0: nobody can show values for that
     assert ask("in.r == 0", "1 / in.r == 5").verdict is Verdict.UNKNOWN
     assert ask("in.r != 0", "in.r / in.r == 1").verdict is Verdict.PROVED
+
+
+@pytest.mark.parametrize(("hypothesis", "goal"), [*TRUE_ALWAYS, *FALSE_SOMEWHERE])
+def test_whether_something_follows_takes_no_model(hypothesis: str, goal: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    found = ask(hypothesis, goal)
+    monkeypatch.setattr(questions, "replay", None)  # where it is called, it fails
+    told = ask(hypothesis, goal, whether=True)
+    assert (told.verdict, told.needed, told.counterexample) == (found.verdict, found.needed, None)
 
 
 def test_needed_hypotheses_and_vacuity() -> None:
