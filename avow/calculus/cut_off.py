@@ -16,7 +16,7 @@ from avow.language.terms import Role, Term, Variable
 from avow.solving.checking import put
 from avow.solving.limits import spent
 from avow.solving.models import Model
-from avow.solving.translation import Meaning, Translator, Unsupported, new_session
+from avow.solving.translation import Expr, Meaning, Translator, Unsupported, new_session
 from avow.solving.z3_module import z3
 
 
@@ -46,7 +46,7 @@ def first_cut(node: Answerer, deadline: float) -> str:
 
 class _Written:
     """A node's guarantees in Z3, for many inputs. Each is translated once for equal values of the inputs that it
-    mentions, and each value once: translation takes most of the time of these queries."""
+    mentions, and each value once. Simplified, many are the same, and so are the queries: each is asked once."""
 
     def __init__(self, node: Node) -> None:
         self.node = node
@@ -55,40 +55,50 @@ class _Written:
             sorted(v.qualified for v in ports_of(c.formula) if v.role is Role.INPUT) for c in node.guarantees
         ]
         self._values: dict[object, Meaning] = {}
-        self._clauses: dict[object, object] = {}
+        self._decided: dict[object, list[Expr]] = {}
+        self._clauses: dict[object, Expr] = {}
+        self.answers: dict[frozenset[int], tuple[list[Expr], str | None]] = {}
+        """By the facts of a query, which are kept: while they are, no other facts have their numbers."""
 
-    def given(self, solver: z3.Solver, inputs: Values) -> dict[Variable, Meaning]:
+    def given(self, facts: list[Expr], inputs: Values) -> dict[Variable, Meaning]:
         """The same as `meanings_of`, with translated values reused."""
         meanings: dict[Variable, Meaning] = {}
         for variable, value in by_variable(self.node, inputs).items():
-            if is_open(value):
-                solver.add(*decided(self.translator, variable, value))
-                continue
             place = variable, key(value)
+            if is_open(value):
+                if place not in self._decided:
+                    self._decided[place] = decided(self.translator, variable, value)
+                facts += self._decided[place]
+                continue
             if place not in self._values:
                 self._values[place] = self.translator.value(value, variable.sort)
             meanings[variable] = self._values[place]
         return meanings
 
-    def guarantees(self, inputs: Values, meanings: Mapping[Variable, Meaning]) -> Iterator[object]:
+    def guarantees(self, inputs: Values, meanings: Mapping[Variable, Meaning]) -> Iterator[Expr]:
         keys = {name: key(value) for name, value in inputs.items()}
         for clause, mentions in zip(self.node.guarantees, self._mentions, strict=True):
             place = clause.name, *(keys.get(name) for name in mentions)
             if place not in self._clauses:
-                self._clauses[place] = self.translator.term(clause.formula, meanings)
+                self._clauses[place] = z3.simplify(self.translator.term(clause.formula, meanings))
             yield self._clauses[place]
 
 
 def _other(written: _Written, ports: list[Port], inputs: Values, found: tuple[Values, ...], free: bool) -> str | None:
     """Another output than those found, in words as far as known; None if there is none."""
     translator = written.translator
-    solver = z3.Solver(ctx=translator.context)
     try:
-        meanings = written.given(solver, inputs)
-        solver.add(*translator.background([p.variable for p in written.node.outputs]))
+        facts = list(translator.background([p.variable for p in written.node.outputs]))
+        meanings = written.given(facts, inputs)
         if not free:
-            solver.add(*written.guarantees(inputs, meanings))
-        return _beside(translator, solver, ports, found)
+            facts += written.guarantees(inputs, meanings)
+        facts += _others(translator, ports, found)
+        place = frozenset(fact.get_id() for fact in facts)
+        if place not in written.answers:
+            solver = z3.Solver(ctx=translator.context)
+            solver.add(*facts)
+            written.answers[place] = facts, _beside(translator, solver, ports)
+        return written.answers[place][1]
     except (Unsupported, z3.Z3Exception):
         return _UNDECIDED
 
@@ -101,7 +111,8 @@ def another_first(node: Answerer, port: Port, condition: Term, inputs: Values, f
     try:
         meanings = meanings_of(translator, solver, node.node, inputs)
         solver.add(*translator.background([port.variable]), translator.term(condition, meanings))
-        return _beside(translator, solver, [port], tuple({port.name: value} for value in found)) is not None
+        solver.add(*_others(translator, [port], tuple({port.name: value} for value in found)))
+        return _beside(translator, solver, [port]) is not None
     except (Unsupported, z3.Z3Exception):
         return True
 
@@ -109,10 +120,14 @@ def another_first(node: Answerer, port: Port, condition: Term, inputs: Values, f
 _UNDECIDED = ", as far as the solver can tell"
 
 
-def _beside(translator: Translator, solver: z3.Solver, ports: list[Port], found: tuple[Values, ...]) -> str | None:
-    """Another output than those found that the solver's facts allow, in words; None if there is none."""
-    for answer in {tuple((p.name, key(answer[p.name])) for p in ports): answer for answer in found}.values():
-        solver.add(z3.Or([z3.Not(z3.And(_known(translator, p, answer[p.name]))) for p in ports]))
+def _others(translator: Translator, ports: list[Port], found: tuple[Values, ...]) -> list[Expr]:
+    """Z3 facts: the output is none of those found."""
+    answers = {tuple((p.name, key(answer[p.name])) for p in ports): answer for answer in found}.values()
+    return [z3.Or([z3.Not(z3.And(_known(translator, p, answer[p.name]))) for p in ports]) for answer in answers]
+
+
+def _beside(translator: Translator, solver: z3.Solver, ports: list[Port]) -> str | None:
+    """An output that the solver's facts allow, in words; None if there is none."""
     answered = put(translator, solver, CUT_EFFORT).status
     if answered == "unsat":
         return None

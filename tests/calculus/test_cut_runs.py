@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from avow.base.verdict import Verdict
+from avow.calculus import cut_off
 
 from .make import make, node, outcomes
 
@@ -52,6 +53,18 @@ def verdict(
 )
 def test_outputs(tmp_path: Path, output: str, guarantee: str, formula: str, domains: str, expected: Verdict) -> None:
     assert verdict(tmp_path, output, guarantee, formula, domains) is expected
+
+
+def test_inputs_that_leave_the_same_question_are_asked_about_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The guarantee says the same for every value that is not negative."""
+    asked: list[object] = []
+    put = cut_off.put
+    monkeypatch.setattr(cut_off, "put", lambda *given: (asked.append(given), put(*given))[1])
+    guarantee = "(in.last >= 0 -> 0 <= out.v <= 6) and (in.last < 0 -> out.v == 7)"
+    assert verdict(tmp_path, "", guarantee, "a.v <= 6", f"out.v: {[*range(7)]}") is Verdict.CHECKED
+    assert len(asked) == 2, "one for all seven values, and one for the initial values"
 
 
 @pytest.mark.parametrize(
