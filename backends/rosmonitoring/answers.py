@@ -38,11 +38,10 @@ def came(
             yield None
         else:
             tally.unreadable += 1
-            _count(monitor, watched, time_of(event))
         return
     touched: dict[object, None] = {}
     for name, readable in names.items():
-        key = _key(monitor, watched, name, event)
+        key = _key(monitor, event)
         if key is None:
             _leave(monitor, watched, event, found)
         parts = watched.fresh.setdefault(key, {})
@@ -74,14 +73,10 @@ def scatter(clauses: Iterable[Watched]) -> None:
         watched.scattered = watched.scattered or len(watched.outputs) > 1
 
 
-def finish(monitor: Monitor, watched: Watched, found: list[Violation]) -> str:
-    """The run is over: judge incomplete answers. Returns why parts may have been matched wrongly, if so."""
+def finish(monitor: Monitor, watched: Watched, found: list[Violation]) -> None:
+    """The run is over: judge incomplete answers."""
     while watched.fresh:
         monitor.judge_part(watched, watched.fresh.pop(next(iter(watched.fresh))), {}, found)
-    if len(set(watched.counted.values())) < 2 and watched.counted.keys() in (set(), watched.outputs):
-        return ""
-    counts = " and ".join(f"{watched.counted.get(name, 0)} of {name}" for name in sorted(watched.outputs))
-    return f"messages: {counts}: which are parts of one answer is not told by their order (`answers: {{by: order}}`)"
 
 
 def judge_part(
@@ -90,7 +85,6 @@ def judge_part(
     """Judge the known part of an answer that was never complete: it is decided if the rest does not matter."""
     tally = watched.tally
     monitor.lose(watched)
-    _count(monitor, watched, max(part.time for part in parts.values()))
     if any(part.values is None for part in parts.values()):
         tally.unreadable += 1
         return
@@ -108,22 +102,13 @@ def judge_part(
         found.append(replace(wrong, heard={n: at for part in parts.values() for n, at in part.heard.items()}))
 
 
-def _count(monitor: Monitor, watched: Watched, time: Fraction) -> None:
-    """Count an answer that is not paired with inputs."""
-    if monitor.pairing is not None:
-        monitor.pairing.count(watched, ticks(time))
+SCATTERED = "a message of one of several outputs was lost: the order does not show which parts are of one answer"
 
 
-SCATTERED = "a message of one of several outputs was lost: which parts are of one answer is not told by their order"
-
-
-def _key(monitor: Monitor, watched: Watched, name: str, event: Mapping[str, Any]) -> object:
+def _key(monitor: Monitor, event: Mapping[str, Any]) -> object:
     pairing = monitor.pairing
     if pairing is None or pairing.answers.by == "latency":
         return None
-    if pairing.answers.by == "order":
-        watched.counted[name] = watched.counted.get(name, 0) + 1
-        return watched.counted[name]
     return pairing.key(event, pairing.answers.output)
 
 
@@ -180,28 +165,20 @@ def asks(monitor: Monitor, watched: Watched) -> tuple[str, ...]:
     return tuple(dict.fromkeys((*watched.paired, *(n for n in monitor.assumed if n in monitor.paired))))
 
 
-def judges_answers_alone(monitor: Monitor, watched: Watched) -> bool:
-    """Whether a clause is about outputs alone, of a node with assumptions on its inputs: if it is broken, the node at
-    fault depends on what the answer answered."""
-    alone = monitor.pairing is not None and watched.outputs and not watched.paired
-    return bool(alone) and not monitor.paired.isdisjoint(monitor.assumed)
-
-
 def saw(monitor: Monitor, pairing: Pairing, name: str, event: Mapping[str, Any], value: Value | None) -> None:
     """A message of an input has come (None: it could not be read)."""
     now, key = time_of(event), pairing.key(event, pairing.answers.input)
     pairing.saw(name, ticks(now), float(now), key, value, monitor.at[name][0])
 
 
-def accused(monitor: Monitor, watched: Watched, values: Mapping[str, Value], event: Mapping[str, Any]) -> bool:
-    """Whether such a clause is broken (`judges_answers_alone`)."""
-    if monitor.pairing is None or not judges_answers_alone(monitor, watched):
+def accused(monitor: Monitor, watched: Watched, values: Mapping[str, Value]) -> bool:
+    """Whether a clause about outputs alone is broken, of a node with assumptions on its inputs: the node at fault
+    depends on what the answer answered."""
+    alone = monitor.pairing is not None and watched.outputs and not watched.paired
+    if not alone or monitor.paired.isdisjoint(monitor.assumed):
         return False
     known = all(name in values and name not in monitor.supposed for name in watched.names)
-    if known and watched.truth_of(values, monitor.solver) is False:
-        return True
-    monitor.pairing.count(watched, ticks(time_of(event)))
-    return False
+    return known and watched.truth_of(values, monitor.solver) is False
 
 
 def ask(
@@ -213,13 +190,13 @@ def ask(
     missing = [n for n in watched.names if n not in monitor.paired and (n not in values or n in monitor.supposed)]
     if missing:
         watched.tally.too_early(n for n in missing if n not in monitor.supposed)
-        pairing.count(watched, ticks(now))
         return
     own = tuple(n for n in speaks(monitor, watched) if n in values)
     inputs = tuple(n for n in asks(monitor, watched) if n in watched.paired or n in pairing.seen)
     key = pairing.key(event, pairing.answers.output) if answer is None else answer.key
     heard = monitor.heard_of(watched.outputs) if answer is None else answer.heard
     known, places = {n: values[n] for n in own}, tuple({place for place, _ in heard.values()})
+    watched.asked = inputs
     pairing.ask(Asked(watched, event, monitor.events, known, inputs, ticks(now), float(now), key, heard, places))
 
 
@@ -282,14 +259,14 @@ def sure(monitor: Monitor, found: list[Violation], *, over: bool = False) -> lis
             monitor.in_doubt.append(violation)
         else:
             tally = monitor.by_order[violation.clause].tally
-            tally.reason = tally.reason or f"{BREACHES_IN_DOUBT} breaches are told, the others counted"
+            tally.reason = tally.reason or f"{BREACHES_IN_DOUBT} breaches are reported, the others counted"
     return told
 
 
 def withdraw(monitor: Monitor, found: list[Violation]) -> list[Violation]:
     """The numbers of messages differ: verdicts on messages paired by order are undecided, unless the messages' numbers
     show which were lost: since then, nothing was judged."""
-    if monitor.exact is not None and monitor.exact.lost and len(_sent(monitor)) == 1:
+    if monitor.unnumbered and len(_sent(monitor)) == 1:
         return found
     for watched in monitor.by_order.values():
         tally = watched.tally
@@ -303,15 +280,36 @@ def withdraw(monitor: Monitor, found: list[Violation]) -> list[Violation]:
 def _sent(monitor: Monitor) -> set[int]:
     """The number of messages that each topic of such clauses had, including those lost according to their numbers."""
     if monitor.word is not None:
-        counts = set(monitor.word.counts.items())
+        topics = {*monitor.word.topics}
     else:
-        pairing = monitor.pairing
-        assert pairing is not None
-        by_name = [(name, known.count) for name, known in pairing.seen.items()]
-        for watched in monitor.by_order.values():
-            counted = pairing.counts.get(id(watched))
-            alone = dict.fromkeys(watched.outputs, counted.count if counted is not None else 0)
-            by_name += (watched.counted or alone).items()
-        counts = {(topic, count) for name, count in by_name for topic in topics_of(monitor.setup, (name,))}
+        outputs = (name for watched in monitor.by_order.values() for name in watched.outputs)
+        seen = monitor.pairing.seen if monitor.pairing is not None else ()
+        topics = {*topics_of(monitor.setup, (*seen, *outputs))}
     passages = monitor.timing.passages
-    return {count + (passages[topic].lost if topic in passages else 0) for topic, count in counts}
+    return {monitor.numbers.get(t, 0) + (passages[t].lost if t in passages else 0) for t in topics}
+
+
+def uneven(monitor: Monitor) -> str:
+    """By order: why messages may have been matched wrongly; empty if they were not. Inputs after the last answer may
+    have no answer yet."""
+    setup, passages, word, pairing = monitor.setup, monitor.timing.passages, monitor.word, monitor.pairing
+    if setup.answers is None or setup.answers.by != "order":
+        return ""
+
+    def later(topic: str, time: Fraction) -> int:
+        """The number of messages after the last answer."""
+        if word is not None:
+            return word.later(topic, time)
+        return max(pairing.later(n, time) for n in monitor.carried(topic) if n in pairing.seen) if pairing else 0
+
+    several = [topics_of(setup, (*w.outputs, *w.asked)) for w in monitor.about(monitor.clauses) if w.outputs]
+    for topics in several if word is None else [word.topics]:
+        counts = {topic: monitor.numbers.get(topic, 0) for topic in topics}
+        answers = {counts[topic] for topic, output in topics.items() if output}
+        ends = (passages[t].latest for t, output in topics.items() if output and t in passages)
+        last = max(filter(None, ends), default=Fraction(0))
+        inputs = [topic for topic, output in topics.items() if not output] if answers - {0} else []
+        if len(answers) > 1 or not all(answers <= {counts[t], counts[t] - later(t, last)} for t in inputs):
+            told = " and ".join(f"{count} of {topic}" for topic, count in counts.items())
+            return f"messages: {told}: their order does not show which belong together (`answers: {{by: order}}`)"
+    return ""

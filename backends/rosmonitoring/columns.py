@@ -22,7 +22,7 @@ from avow.base.diagnostics import Diagnostic, Rejected
 from avow.evaluation.evaluate import NotEvaluable
 from avow.ros.bags import ENVELOPE, LIVE, Event
 
-from .answers import judges_answers_alone, sure
+from .answers import sure
 from .batch import NONE, UNKNOWN, UNREADABLE, Batch, Column, Flags, Floats, Ints, combinations, of_events
 from .engine import Monitor
 from .options import same_topic
@@ -263,6 +263,7 @@ class Watch:
             if plan is None:
                 continue
             monitor.relevant += high - low
+            monitor.numbers[topic] = monitor.numbers.get(topic, 0) + high - low
             last.append(int(rows[high - 1]))
             for watched in plan.asked:
                 watched.tally.published += high - low
@@ -273,8 +274,6 @@ class Watch:
                 tally.triggered = tally.triggered or bool(judged.met[low:high].any())
                 for name, ages in judged.ages.items():
                     tally.aging(name, float(ages[low:high].max()))
-                if monitor.pairing is not None and judges_answers_alone(monitor, watched):
-                    monitor.pairing.count(watched, ticks_at(batch.event(last[-1])), high - low)
         for row in sorted(last):
             monitor.caught_up(batch.event(row), batch.lines[row])
         if last:

@@ -21,12 +21,12 @@ from avow.formulas.values import Value
 from avow.language.contract import Clause, ClauseKind
 from avow.ros.bags import LIVE, publisher
 
-from .answers import accused, ask, came, doubtful, finish, judge_answer, judge_part, own, saw, scatter, sure, withdraw
+from . import answers
 from .latest import Doubts, SoFar, judge_latest, not_met, verdict_of
 from .memory import hear, overdue, soonest, watching
 from .options import Setup, same_topic
 from .pace import SIMULATED, By, Clock, Passage, Timing
-from .pairing import Asked, Choices, Pairing, Ticks, backwards, ticks, time_of
+from .pairing import NUMBER, Asked, Choices, Pairing, Ticks, backwards, ticks, time_of
 from .reading import Reader, reader
 from .rules import Choice, Constant, Fields, Previous, heard_through, of_latest
 from .tuning import OPEN_QUESTIONS, TOPICS_KEPT
@@ -71,6 +71,10 @@ class Monitor:
     """The clauses whose verdict may be about messages that do not belong together, which is known only at the end."""
     in_doubt: list[Violation] = field(default_factory=list)
     """Their breaches."""
+    numbers: dict[str, int] = field(default_factory=dict)
+    """By order: the number of the node's messages of each topic so far."""
+    unnumbered: bool = False
+    """By order: a message was lost, according to its topic's numbers."""
     word: Word | None = None
     """The order of the steps, if clauses speak of other steps and `answers` determines it."""
     assumed: tuple[str, ...] = ()
@@ -102,7 +106,7 @@ class Monitor:
         self.timing = Timing(self.setup.fresh, self.setup.rates)
         self._clock = None if self.setup.time is By.RECEIPT else Clock(self.setup.time)
         self._observe()
-        answers, self.paired = self.setup.answers, self.setup.heard
+        given, self.paired = self.setup.answers, self.setup.heard
         spoken = (v.qualified for a in self.setup.node.assumptions for v in free_variables(a.formula))
         self.assumed = tuple(dict.fromkeys(name for name in spoken if name in self.setup.rules))
         node = self.setup.node
@@ -110,9 +114,9 @@ class Monitor:
         wanted = set(written if self.guarantees is None else self.guarantees)
         watched = [c for c in node.clauses if c.kind is ClauseKind.ASSUMPTION or c.name in wanted]
         self.word = word_of(self.setup, watched)
-        if self.word is None and answers is not None and answers.by != "arrival":
-            self.pairing = Pairing(answers)
-            if answers.by == "latency":
+        if self.word is None and given is not None and given.by != "arrival":
+            self.pairing = Pairing(given)
+            if given.by == "latency":
                 self.pairing.begins({n: v for n, v in self.values.items() if n in self.paired})
         else:
             self.so_far = SoFar(self.setup.leeway.jitter) if remembers(node) else None
@@ -147,14 +151,14 @@ class Monitor:
         contains."""
         self.events += 1
         if self._clock is None:
-            return sure(self, self._step(event, place))
+            return answers.sure(self, self._step(event, place))
         found: list[Violation] = []
         now = self.events
         for number, each, where in self._clock.ready(now, event, place or now):
             self.events = number
             found += self._step(each, where)
         self.events = now
-        return sure(self, found)
+        return answers.sure(self, found)
 
     def _step(self, event: Mapping[str, Any], place: int) -> list[Violation]:
         topic = event.get("topic")
@@ -163,7 +167,7 @@ class Monitor:
             self.heard.add(same_topic(topic))
         if LIVE in event and self.by_arrival and self.doubts is None:
             self.doubts = Doubts.beginning(self.values)
-        readers = own(self, readers, event) if readers and self.setup.shared else readers
+        readers = answers.own(self, readers, event) if readers and self.setup.shared else readers
         names = [name for name, _ in readers or ()]
         if readers is not None and self.so_far is not None and self._timed:
             self.so_far.hears(time_of(event), self._timed)
@@ -172,19 +176,20 @@ class Monitor:
             return found
         self.relevant += 1
         missed = self.timing.hear(event, same_topic(topic), names)
+        by = "arrival" if self.setup.answers is None else self.setup.answers.by
+        if by == "order" and names:
+            number = self.numbers[same_topic(topic)] = self.numbers.get(same_topic(topic), 0) + 1
+            self.unnumbered = self.unnumbered or missed
+            event = event if self.unnumbered else {**event, NUMBER: number}
         if self.word is not None and same_topic(topic) in self.word.topics:
             message = Message(same_topic(topic), event, self.events, place, tuple(readers), missed)
             follow(self, self.word.hears(message), found)
             return found
         if missed:
             self.miss(set(names))
-            by = "arrival" if self.pairing is None else self.pairing.answers.by
-            if self.pairing is not None:
-                self.pairing.lost = self.pairing.lost or by == "order"
             if by in ("arrival", "order"):
-                scatter(w for name in names for w in self.clauses.get(name, ()))
-        answers = self.setup.answers
-        if answers is not None and answers.by == "arrival" and not self.backwards and "time" in event:
+                answers.scatter(w for name in names for w in self.clauses.get(name, ()))
+        if self.setup.answers is not None and by == "arrival" and not self.backwards and "time" in event:
             now, before = time_of(event), self._latest
             self.backwards, self._latest = backwards(now, before, self.events), now
         self.conclude(self.read(event, place, readers, found), event, found)
@@ -212,13 +217,13 @@ class Monitor:
                 if of_latest(self.setup.rules[name]):
                     self.forget(name)
                 if self.kept is not None and (pairing is None or name in self.paired):
-                    saw(self, self.kept, name, event, None)
+                    answers.saw(self, self.kept, name, event, None)
                 updated[name] = False
                 continue
             self.supposed.discard(name)
             updated[name] = True
             if self.kept is not None and (pairing is None or name in self.paired):
-                saw(self, self.kept, name, event, new)
+                answers.saw(self, self.kept, name, event, new)
             if old is None or new != old:
                 self.values[name] = new
                 self.versions[name] += 1
@@ -231,8 +236,8 @@ class Monitor:
             self._judge(self._constant.pop(), event, found)
         for watched, answer in self._due(updated, event, found):
             values = self.known(watched, answer)
-            if watched.paired or accused(self, watched, values, event):
-                ask(self, watched, values, answer, event)
+            if watched.paired or answers.accused(self, watched, values):
+                answers.ask(self, watched, values, answer, event)
             else:
                 self._aged(watched, event)
                 self._judge(watched, event, found, answer)
@@ -359,21 +364,20 @@ class Monitor:
         self.backwards = self.backwards or ("" if self._clock is None else self._clock.finish())
         if self.kept is not None:
             self.settle(None, found)
-        if self.pairing is not None:
-            self.backwards = self.backwards or self.pairing.uneven()
+        why = answers.uneven(self)
+        self.backwards = self.backwards or ("" if self.pairing is None else self.pairing.late) or why
         if self.word is not None:
-            follow(self, self.word.finish(), found)
-            self.backwards = self.backwards or self.word.uneven
+            follow(self, self.word.finish(uneven=bool(why)), found)
         for watched in self.about(self.clauses):
-            self.backwards = finish(self, watched, found) or self.backwards
+            answers.finish(self, watched, found)
             watched.tally.open += watched.steps is not None and watched.steps.open
             if any(of not in self._seen for name in watched.names if (of := heard_through(self.setup.rules[name]))):
                 watched.only_supposed()
             if watched in self._timed and (why := self.timing.standing):
                 watched.tally.withdrawn(why)
-        found = sure(self, found, over=True)
+        found = answers.sure(self, found, over=True)
         found, self.in_doubt = [*self.in_doubt, *found], []
-        return withdraw(self, found) if self.backwards else found
+        return answers.withdraw(self, found) if self.backwards else found
 
     def settle(self, now: Ticks | None, found: list[Violation]) -> None:
         """Judge the answers whose inputs are known at a time (None: the run is over)."""
@@ -383,7 +387,7 @@ class Monitor:
             self.judge_answer(asked, choices, found)
 
     def judge_answer(self, asked: Asked, choices: Choices, found: list[Violation]) -> None:
-        judge_answer(self, asked, choices, found)
+        answers.judge_answer(self, asked, choices, found)
 
     def verdict(self, watched: Watched, values: Mapping[str, Value]) -> Fault | str | None:
         return verdict_of(watched, self.assumptions, values, self.solver)
@@ -400,7 +404,7 @@ class Monitor:
         due: list[tuple[Watched, Answer | None]] = []
         for watched, names in touched.values():
             if watched.outputs:
-                due += [(watched, answer) for answer in came(self, watched, names, event, found)]
+                due += [(watched, answer) for answer in answers.came(self, watched, names, event, found)]
                 continue
             watched.tally.published += 1
             if all(names.values()):
@@ -414,7 +418,7 @@ class Monitor:
     def judge_part(
         self, watched: Watched, parts: Mapping[str, Part], event: Mapping[str, Any], found: list[Violation]
     ) -> None:
-        judge_part(self, watched, parts, event, found)
+        answers.judge_part(self, watched, parts, event, found)
 
     def spoken(self, watched: Watched) -> tuple[str, ...]:
         """The variables of a clause and of the assumptions."""
@@ -437,7 +441,7 @@ class Monitor:
         if watched.steps is not None:
             self._remembering.append(watched)
             self._timed += [watched] if watched.steps.silence is not None else []
-        if doubtful(self, watched):
+        if answers.doubtful(self, watched):
             self.by_order[clause.name] = watched
         for name in triggers:
             self.clauses.setdefault(name, []).append(watched)

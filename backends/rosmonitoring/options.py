@@ -27,7 +27,7 @@ from avow.system.plan import Edge, Located, System
 
 from . import observing
 from .pace import NO_TIME, RATE, By, Leeway, Rate, duration
-from .pairing import Answers
+from .pairing import NUMBER, Answers
 from .reading import Undecided, from_text, shown
 from .rules import NOTHING_KNOWN, Choice, Constant, FieldPath, Fields, Previous, Rule, of_latest, otherwise, told_only
 from .traces import carried
@@ -209,7 +209,7 @@ class _Work:
             if known and name.startswith(f"{Role.INPUT}."):
                 text = f"by {by} it has no effect: an answer is judged with the message that it answered"
                 self.fault(text, name, "initial", hint="leave it out, or pair by `latency` or `arrival`")
-        usual = {"stamp": ("header", "stamp"), "call": (CALL,)}.get(by, ())
+        usual = {"stamp": ("header", "stamp"), "call": (CALL,), "order": (NUMBER,)}.get(by, ())
         return Answers(
             by,
             str(entry.get("because", "")),

@@ -15,7 +15,8 @@ import numpy as np
 
 from .answers import asks, speaks
 from .batch import NONE, UNREADABLE, Batch, Flags, Floats, Ints
-from .pairing import Pairing, Said, ticks_at
+from .pairing import NUMBER, Pairing, Said, ticks_at
+from .rules import FieldPath
 from .tuning import COMBINATIONS, KEYS_KEPT, TICKS
 from .watched import DEPENDS, Watched
 
@@ -72,7 +73,7 @@ class Paired:
         self._latency, self._jitter = int(-(-pairing.latency // _NANO)), int(pairing.jitter // _NANO)
         self._times = _nanoseconds(batch) if self._by == "latency" and not batch.backwards else NONE
         self._numbers: dict[object, int] = {}
-        self._groups: dict[tuple[str, object], tuple[Ints, Ints]] = {}
+        self._groups: dict[tuple[str, FieldPath], tuple[Ints, Ints]] = {}
         """The rows and ids of messages that have keys."""
         self._inputs: dict[str, _Input] = {}
         self._asked: list[_Asked] = []
@@ -86,7 +87,7 @@ class Paired:
     def _possible(self) -> bool:
         if self._by != "order":
             return self._by != "latency" or len(self._times) > 0
-        lost = self._pairing.lost or self._watch.gap
+        lost = self._watch.monitor.unnumbered or self._watch.gap
         return not lost and all(self._watch.plan(topic) is not None for topic in self._topics)
 
     def _find(self) -> None:
@@ -94,10 +95,9 @@ class Paired:
         for name in monitor.paired:
             known = pairing.seen.get(name)
             rows, codes = self._watch.known(name)
-            count = known.count if known else 0
             # `place` 0: an initial value, whose answers the engine judges
             kept = [said for said in known.messages if said.place] if known and self._times.size else []
-            ids = self._ids(self._watch.topic(name), pairing.answers.input, name, count) if len(rows) else NONE
+            ids = self._ids(self._watch.topic(name), pairing.answers.input) if len(rows) else NONE
             self._inputs[name] = _Input(
                 kept,
                 np.concatenate((np.full(len(kept), -1), rows)),
@@ -110,8 +110,7 @@ class Paired:
         for topic in self._topics:
             for watched in monitor.about(monitor.carried(topic)):
                 if watched.paired:
-                    count = pairing.counts[id(watched)].count if id(watched) in pairing.counts else 0
-                    asking.append((topic, watched, self._ids(topic, pairing.answers.output, id(watched), count)))
+                    asking.append((topic, watched, self._ids(topic, pairing.answers.output)))
         if self._by != "latency":
             before: list[object] = [key for seen in pairing.seen.values() for key in seen.by_key]
             before += [None, *(asked.key for asked in pairing.waiting.values())]
@@ -128,19 +127,21 @@ class Paired:
         value, column = self._pairing.value_of(name, said), self._watch.column(name)
         return UNREADABLE if value is None or column is None else column.code_of(value)
 
-    def _ids(self, topic: str, path: tuple[str | int, ...], owner: object, count: int) -> Ints:
-        """The ids by which a topic's messages are paired; by order, after `count` earlier messages."""
+    def _ids(self, topic: str, path: FieldPath) -> Ints:
+        """The ids by which a topic's messages are paired."""
         rows = self._topics[topic]
         if self._by == "latency":
             return self._times[rows]
-        group = (topic, owner if self._by == "order" else path)
-        if group not in self._groups:
-            keys = range(count + 1, count + 1 + len(rows)) if self._by == "order" else self._keys(topic, path)
-            numbers = self._numbers
-            self._groups[group] = rows, np.array([numbers.setdefault(key, len(numbers)) for key in keys], np.int64)
-        return self._groups[group][1]
+        if (topic, path) not in self._groups:
+            numbers, keys = self._numbers, self._keys(topic, path)
+            ids = np.array([numbers.setdefault(key, len(numbers)) for key in keys], np.int64)
+            self._groups[topic, path] = rows, ids
+        return self._groups[topic, path][1]
 
-    def _keys(self, topic: str, path: tuple[str | int, ...]) -> Iterable[object]:
+    def _keys(self, topic: str, path: FieldPath) -> Iterable[object]:
+        if path == (NUMBER,):
+            first = self._watch.monitor.numbers.get(topic, 0) + 1
+            return range(first, first + len(self._topics[topic]))
         second, rest = (self._batch.array(topic, (*path, part)) for part in ("sec", "nanosec"))
         if second is not None and rest is not None:
             return [(time, "s") for time in (second.astype(np.int64) * 10**9 + rest).tolist()]
@@ -273,7 +274,7 @@ class Paired:
         since = one.ids[high - 1] - self._latency - 2 * self._jitter
         first = high - KEYS_KEPT if self._by != "latency" else int(np.searchsorted(one.ids, since, "right")) - 1
         first = low if self._by == "latency" and pairing.waiting else max(low, first)
-        pairing.passed_over(name, first - low)
+        pairing.input(name)
         keys = [*self._numbers] if self._by != "latency" else []
         for k in range(first, high):
             row = int(one.rows[k])
@@ -294,7 +295,7 @@ class Paired:
         for name in watched.paired:
             ages = batch.times[rows] - self._inputs[name].seconds[asked.ranges[name][0][low:high]]
             tally.aging(name, float(ages.max()))
-        pairing.count(watched, ticks_at(batch.event(int(rows[-1]))), high - low).inputs = tuple(asked.ranges)
+        watched.asked = tuple(asked.ranges)
         pairing.asked += high - low
         for k in range(max(low, high - KEYS_KEPT), high) if watched.outputs else ():
             messages = {

@@ -4,8 +4,9 @@ By `arrival`, an answer is compared with the values that came before it: for tra
 `key` or `stamp`, with those of the message that has the same key. By `latency`, each input may have had any value that
 was current from `latency + jitter` before the answer to `jitter` after it, independently: what holds for all
 combinations holds, what is broken for all is broken, and anything else is undecided. By `call`, with the request of the
-same call; by `order`, the k-th with the k-th, if there are as many of both. Independence includes more combinations
-than occurred, so that both verdicts are right as long as the two bounds are.
+same call; by `order`, the k-th with the k-th: the engine numbers the messages of each topic (`NUMBER`), and the number
+is the key. Independence includes more combinations than occurred, so that both verdicts are right as long as the two
+bounds are.
 """
 
 from __future__ import annotations
@@ -30,6 +31,11 @@ from .wires import MappingError, NotANumber, exact, seconds
 
 if TYPE_CHECKING:
     from .watched import Heard, Watched
+
+
+NUMBER = "_number"
+"""By order: the field with a message's number among those of its topic."""
+LOST = "a message was lost: the order of the others does not show which belong together"
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,8 +125,6 @@ class _Seen:
 
     messages: deque[Said] = field(default_factory=deque)
     by_key: dict[object, list[Said]] = field(default_factory=dict)
-    count: int = 0
-    """The number of all messages, including those that are no longer kept."""
 
     def keep(self, said: Said) -> None:
         self.messages.append(said)
@@ -134,15 +138,6 @@ class _Seen:
 
 
 @dataclass(slots=True)
-class _Count:
-    """The answers of one clause: their number, when the last of them came, and the inputs that any was paired with."""
-
-    count: int = 0
-    time: Ticks = 0
-    inputs: tuple[str, ...] = ()
-
-
-@dataclass(slots=True)
 class Pairing:
     """The inputs that have been seen, and the answers that wait for theirs."""
 
@@ -152,8 +147,6 @@ class Pairing:
     """The answers by their numbers."""
     asked: int = 0
     """The number of answers that were asked."""
-    counts: dict[int, _Count] = field(default_factory=dict)
-    """The counts by the id of the watched clause."""
     answered: OrderedDict[int, Mapping[str, tuple[int, ...]]] = field(default_factory=OrderedDict)
     """The place of an answer's message → the places of the messages that it was paired with."""
     readers: Mapping[str, Reader] = field(default_factory=dict, repr=False)
@@ -162,8 +155,6 @@ class Pairing:
     """By latency: no input of this time or an earlier one may come any more."""
     late: str = ""
     """Why the run is no evidence: an input came too late."""
-    lost: bool = False
-    """By order: a message was lost, according to its topic's numbers."""
     latency: Ticks = field(init=False)
     jitter: Ticks = field(init=False)
     _awaited: dict[object, list[Asked]] = field(default_factory=dict)
@@ -174,26 +165,29 @@ class Pairing:
     def __post_init__(self) -> None:
         self.latency, self.jitter = ticks(self.answers.latency), ticks(self.answers.jitter)
 
-    def passed_over(self, name: str, count: int) -> _Seen:
-        """`count` messages of an input came that no answer can be paired with any more."""
+    def input(self, name: str) -> _Seen:
+        """The messages of an input, of which there may be none yet."""
         known = self.seen.get(name)
         if known is None:
             known = self.seen[name] = _Seen()
-        known.count += count
         return known
+
+    def later(self, name: str, time: Fraction) -> int:
+        """The number of messages of an input that are later than a time, as far as they are kept."""
+        return sum(said.time > ticks(time) for said in self.input(name).messages)
 
     def begins(self, values: Mapping[str, Value]) -> None:
         """The values before any message: at no time and no place, so that they have no age."""
         for name, value in values.items():
-            self.passed_over(name, 0).messages.append(Said(-2 * LATEST_TIME * TICKS, math.inf, None, value, 0))
+            self.input(name).messages.append(Said(-2 * LATEST_TIME * TICKS, math.inf, None, value, 0))
 
     def saw(
         self, name: str, time: Ticks, seconds: float, key: object, value: Value | Mapping[str, Any] | None, place: int
     ) -> Said:
         """A message of an input, at a place of the trace."""
-        known = self.passed_over(name, 1)
+        known = self.input(name)
         if self.answers.by != "latency":
-            said = Said(time, seconds, known.count if self.answers.by == "order" else key, value, place)
+            said = Said(time, seconds, key, value, place)
             self._touched.append(said.key)
             if any(one.used and self._differ(name, one, said) for one in known.by_key.get(said.key, ())):
                 self.late = self.late or f"a message of {name} bears the key of one that was answered before"
@@ -221,21 +215,8 @@ class Pairing:
         values = self.value_of(name, one), self.value_of(name, other)
         return None in values or values[0] != values[1]
 
-    def count(self, watched: Watched, time: Ticks, several: int = 1) -> _Count:
-        """Answers have come that need not wait: they are counted with the others."""
-        found = self.counts.get(id(watched))
-        if found is None:
-            found = self.counts[id(watched)] = _Count()
-        found.count += several
-        found.time = time
-        return found
-
     def ask(self, asked: Asked) -> None:
         """An answer has come."""
-        counted = self.count(asked.watched, asked.time)
-        counted.inputs = asked.inputs
-        if self.answers.by == "order" and asked.key is None:  # an answer whose parts came apart has its own number
-            asked.key = counted.count
         self.asked += 1
         asked.number = self.asked
         self.waiting[asked.number] = asked
@@ -245,22 +226,6 @@ class Pairing:
     def waits(self, event: int) -> bool:
         """Whether an answer of this event or an earlier one is not judged yet."""
         return any(asked.index <= event for asked in self.waiting.values())
-
-    def uneven(self) -> str:
-        """Why the answers may be paired wrongly; empty if they are not. By order, inputs after the last answer may have
-        no answer yet."""
-        if self.late:
-            return self.late
-        for counted in self.counts.values() if self.answers.by == "order" else ():
-            for name in counted.inputs:
-                known = self.seen.get(name, _Seen())
-                late = sum(said.time > counted.time for said in known.messages)
-                if counted.count not in (known.count, known.count - late):
-                    return (
-                        f"{known.count} messages of {name} and {counted.count} answers: which answer was to which is "
-                        "not told by their order (`answers: {by: order}`)"
-                    )
-        return ""
 
     def ready(self, now: Ticks | None) -> Iterator[tuple[Asked, Choices]]:
         """The answers whose inputs are known at a time (None: the run is over), each with the messages of each input
@@ -353,9 +318,7 @@ class Pairing:
 
     def _same_key(self, name: str, asked: Asked) -> list[Said] | str:
         if asked.key is None:
-            return "the answer has no key"
-        if self.lost:
-            return "a message was lost: which answer was to which is not told by their order"
+            return LOST if self.answers.by == "order" else "the answer has no key"
         known = self.seen.get(name)
         if known is None:
             return f"no message of {name} came"

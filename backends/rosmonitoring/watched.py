@@ -241,8 +241,8 @@ class Watched:
     """The outputs that must all be published again before it is judged: they are the parts of one answer."""
     fresh: dict[object, dict[str, Part]] = field(default_factory=dict)
     """The parts of answers that are not complete yet, by the key that the parts of one answer share (`answers`)."""
-    counted: dict[str, int] = field(default_factory=dict)
-    """By order: the number of messages of each output."""
+    asked: tuple[str, ...] = ()
+    """By order: the inputs that its answers were paired with."""
     scattered: bool = False
     """A message of one of several outputs was lost: it is no longer known which parts are of one answer."""
     held: tuple[tuple[str, str], ...] = ()

@@ -8,7 +8,6 @@ may have been a step that was not seen.
 
 from __future__ import annotations
 
-import math
 from collections import OrderedDict, deque
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
@@ -68,19 +67,11 @@ class Word:
     """The topics of the clauses, and whether each carries outputs."""
     answered: OrderedDict[int, Mapping[str, tuple[int, ...]]] = field(default_factory=OrderedDict)
     """As `Pairing.answered`."""
-    uneven: str = ""
-    """By order: why the answers may be paired wrongly."""
-    counts: dict[str, int] = field(default_factory=dict)
-    """By order: the number of messages of each topic."""
-    lost: bool = False
-    """By order: as `Pairing.lost`."""
     _queues: dict[str, deque[Message]] = field(default_factory=dict)
     _where: dict[object, set[str]] = field(default_factory=dict)
     """For each key, the topics on which it waits."""
     _gone: OrderedDict[object, None] = field(default_factory=OrderedDict)
     """The latest keys that no longer wait, or came twice."""
-    _answer: Fraction | None = None
-    """By order: the time of the latest answer."""
 
     def __post_init__(self) -> None:
         self._queues = {topic: deque() for topic in self.topics}
@@ -101,19 +92,14 @@ class Word:
         elif len(queue) > KEYS_KEPT:
             yield from self._unpaired([queue.popleft()])
 
-    def finish(self) -> Iterator[Step]:
-        """The run is over. Inputs without an answer are in order among themselves."""
+    def later(self, topic: str, time: Fraction) -> int:
+        """The number of messages that wait and are later than a time."""
+        return sum(time_of(message.event) > time for message in self._queues[topic])
+
+    def finish(self, *, uneven: bool) -> Iterator[Step]:
+        """The run is over. Inputs without an answer are in order among themselves, unless the topics are `uneven`."""
         left = {topic: queue for topic, queue in self._queues.items() if queue}
-        if self.answers.by == "order":
-            answer = -math.inf if self._answer is None else self._answer
-            late = [t for t, q in left.items() if self.topics[t] or any(time_of(m.event) <= answer for m in q)]
-            counts = " and ".join(f"{self.counts.get(topic, 0)} of {topic}" for topic in self.topics)
-            self.uneven = (
-                f"messages: {counts}: which belong together is not told by their order (`answers: {{by: order}}`)"
-                if late
-                else ""
-            )
-        if not any(self.topics[topic] for topic in left) and not self.uneven:
+        if not any(self.topics[topic] for topic in left) and not uneven:
             for key in [message.key for queue in left.values() for message in queue]:
                 if self._where.get(key, set()) >= {t for t, output in self.topics.items() if not output}:
                     yield from self._reach(key, left)
@@ -126,15 +112,9 @@ class Word:
         return any(queue and queue[0].index <= event for queue in self._queues.values())
 
     def _key(self, message: Message) -> object:
-        topic, output = message.topic, self.topics[message.topic]
-        if self.answers.by != "order":
-            key = Pairing.key(message.event, self.answers.output if output else self.answers.input)
-            return object() if key is None else key
-        self.lost = self.lost or message.missed
-        self.counts[topic] = self.counts.get(topic, 0) + 1
-        if output:
-            self._answer = max(time_of(message.event), self._answer or Fraction(0))
-        return object() if self.lost else self.counts[topic]
+        answers, output = self.answers, self.topics[message.topic]
+        key = Pairing.key(message.event, answers.output if output else answers.input)
+        return object() if key is None else key
 
     def _reach(self, key: object, topics: Mapping[str, object]) -> Iterator[Step]:
         """The step of a key, preceded by the messages that can no longer be part of a step."""

@@ -298,7 +298,7 @@ def test_after_a_loss_order_tells_nothing(
     assert ([*running.unmonitored()] == []) is fine
     assert found == []
     if not fine:
-        assert "is not told by their order" in running.monitors[0].backwards
+        assert "their order does not show which belong together" in running.monitors[0].backwards
 
 
 @pytest.mark.parametrize(("again", "evidence"), [(5, True), (12, False)])
