@@ -139,10 +139,10 @@ def _known(monitor: Monitor, watched: Watched, name: str) -> dict[str, Value]:
 
 
 def _open(monitor: Monitor, watched: Watched, values: Mapping[str, Value]) -> bool | None:
-    if not monitor.solver or not monitor.questions or watched.clause.kind is ClauseKind.ASSUMPTION:
+    if not monitor.questions or watched.clause.kind is ClauseKind.ASSUMPTION:
         return None
     monitor.questions -= 1
-    return open_verdict(watched, monitor.assumptions, values, monitor.solver)
+    return open_verdict(watched, monitor.assumptions, values)
 
 
 def own(monitor: Monitor, readers: list[tuple[str, Reader]], event: Mapping[str, Any]) -> list[tuple[str, Reader]]:
@@ -178,7 +178,7 @@ def accused(monitor: Monitor, watched: Watched, values: Mapping[str, Value]) -> 
     if not alone or monitor.paired.isdisjoint(monitor.assumed):
         return False
     known = all(name in values and name not in monitor.supposed for name in watched.names)
-    return known and watched.truth_of(values, monitor.solver) is False
+    return known and watched.truth_of(values) is False
 
 
 def ask(

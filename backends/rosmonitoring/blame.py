@@ -203,4 +203,4 @@ def _inputs(node: Node, clause: str) -> list[str]:
 def _failing(monitor: Monitor) -> bool:
     """Whether an assumption fails for the currently known values."""
     known = (a for a in monitor.assumptions if a.steps is None and monitor.values.keys() >= set(a.names))
-    return any(assumed.truth_of(monitor.values, monitor.solver) is False for assumed in known)
+    return any(assumed.truth_of(monitor.values) is False for assumed in known)

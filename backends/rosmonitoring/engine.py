@@ -41,8 +41,6 @@ class Monitor:
 
     setup: Setup
     guarantees: Iterable[str] | None = None
-    solver: bool = True
-    """Whether to use Z3 if evaluation alone cannot decide."""
     events: int = 0
     relevant: int = 0
     tallies: dict[str, Tally] = field(default_factory=dict)
@@ -51,7 +49,6 @@ class Monitor:
     """The topics of the messages so far."""
     at: dict[str, tuple[int, str]] = field(default_factory=dict)
     """The message that each variable's value is from, as in `Heard`."""
-    _seen: set[str] = field(default_factory=set)
     versions: dict[str, int] = field(default_factory=dict)
     _readers: dict[str, list[tuple[str, Reader]]] = field(default_factory=dict)
     previous: list[tuple[str, str]] = field(default_factory=list)
@@ -81,8 +78,6 @@ class Monitor:
     """The variables of the assumptions."""
     backwards: str = ""
     """Where the events' times contradict the order in which they came, if the plan relies on that order."""
-    settled: set[int] = field(default_factory=set)
-    """The ids of the clauses whose answers were judged since this was last emptied."""
     _latest: Fraction | None = None
     unread: dict[str, str] = field(default_factory=dict)
     """The variables of which a message could not be read, and why the first could not."""
@@ -204,7 +199,6 @@ class Monitor:
         pairing, updated = self.pairing, dict[str, bool]()
         self.at.update(dict.fromkeys((name for name, _ in readers), (place or self.events, publisher(event))))
         for name, read in readers:
-            self._seen.add(name)
             old = self.values.get(name)
             try:
                 new = read(event, old)
@@ -308,7 +302,7 @@ class Monitor:
             if source in self.at:
                 self.at[name] = self.at[source]
             if value is None:
-                if source in self._seen and name in self.values:
+                if source in self.at and name in self.values:
                     self.forget(name)
             elif self.values.get(name) is not value:
                 self.values[name] = value
@@ -371,7 +365,7 @@ class Monitor:
         for watched in self.about(self.clauses):
             answers.finish(self, watched, found)
             watched.tally.open += watched.steps is not None and watched.steps.open
-            if any(of not in self._seen for name in watched.names if (of := heard_through(self.setup.rules[name]))):
+            if any(of not in self.at for name in watched.names if (of := heard_through(self.setup.rules[name]))):
                 watched.only_supposed()
             if watched in self._timed and (why := self.timing.standing):
                 watched.tally.withdrawn(why)
@@ -383,14 +377,13 @@ class Monitor:
         """Judge the answers whose inputs are known at a time (None: the run is over)."""
         assert self.kept is not None
         for asked, choices in self.kept.ready(now):
-            self.settled.add(id(asked.watched))
             self.judge_answer(asked, choices, found)
 
     def judge_answer(self, asked: Asked, choices: Choices, found: list[Violation]) -> None:
         answers.judge_answer(self, asked, choices, found)
 
     def verdict(self, watched: Watched, values: Mapping[str, Value]) -> Fault | str | None:
-        return verdict_of(watched, self.assumptions, values, self.solver)
+        return verdict_of(watched, self.assumptions, values)
 
     def _due(
         self, readable: Mapping[str, bool], event: Mapping[str, Any], found: list[Violation]

@@ -61,7 +61,7 @@ class SoFar:
 
 
 def _blamed(
-    watched: Watched, truth: bool | None, assumptions: Sequence[Watched], values: Mapping[str, Value], solver: bool,
+    watched: Watched, truth: bool | None, assumptions: Sequence[Watched], values: Mapping[str, Value],
     so_far: SoFar | None = None, event: int = 0,
 ) -> tuple[Fault, str] | None:  # fmt: skip
     """The fault of a clause that does not hold, and the explanation; None if it cannot be decided."""
@@ -73,7 +73,7 @@ def _blamed(
     for assumed in assumptions:
         if assumed.steps is not None or any(n not in values for n in assumed.names):
             continue
-        if assumed.truth_of(values, solver) is False:
+        if assumed.truth_of(values) is False:
             if so_far is not None:
                 so_far.broken = so_far.broken or assumed.clause.name
             return Fault.EXCUSED, f"{said}; but the assumption {assumed.clause.name} does not hold"
@@ -84,12 +84,10 @@ def _blamed(
     return None if so_far is not None and (so_far.unsure or any(late)) else (Fault.GUARANTEE, said)
 
 
-def verdict_of(
-    watched: Watched, assumptions: Sequence[Watched], values: Mapping[str, Value], solver: bool
-) -> Fault | str | None:
+def verdict_of(watched: Watched, assumptions: Sequence[Watched], values: Mapping[str, Value]) -> Fault | str | None:
     """Whether a clause without memory held for the values; None if it cannot be decided."""
-    truth = watched.truth_of(values, solver)
-    blame = None if truth else _blamed(watched, truth, assumptions, values, solver)
+    truth = watched.truth_of(values)
+    blame = None if truth else _blamed(watched, truth, assumptions, values)
     return "held" if truth else blame and blame[0]
 
 
@@ -108,7 +106,7 @@ def judge_latest(
         key = (*[monitor.versions[n] for n in watched.names], supposed)
         if key != watched.key or watched.held or answer is not None:
             watched.key = key if answer is None else None
-            watched.truth = watched.truth_of(values, monitor.solver)
+            watched.truth = watched.truth_of(values)
             if not supposed:
                 watched.note_trigger(values)
     else:
@@ -122,7 +120,7 @@ def judge_latest(
             return
         lost = steps.lost
         steps.comes(time_of(event))
-        watched.truth = steps.step(watched, values, monitor.solver, monitor.events, supposed)
+        watched.truth = steps.step(watched, values, monitor.events, supposed)
     if monitor.so_far is not None:
         monitor.so_far.note(watched)
     if steps is not None:
@@ -152,7 +150,7 @@ def not_met(
     if monitor.doubts is not None and monitor.doubts.ask(monitor, watched, values, event):
         return
     tally.judged += 1
-    known = monitor.assumptions, values, monitor.solver, monitor.so_far, monitor.events
+    known = monitor.assumptions, values, monitor.so_far, monitor.events
     blame = _blamed(watched, watched.truth, *known)
     if blame is None:
         tally.undecided += 1

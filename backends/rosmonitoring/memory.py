@@ -277,11 +277,9 @@ class Memory:
         self._keeper.memory = {n: v for n, v in self._keeper.memory.items() if not isinstance(v, _Unknown)}
         self.lost = self.lost and self._keeper.memory.keys() != self._cells
 
-    def step(
-        self, watched: Watched, values: Mapping[str, Value], solver: bool, event: int, supposed: bool
-    ) -> bool | None:
+    def step(self, watched: Watched, values: Mapping[str, Value], event: int, supposed: bool) -> bool | None:
         """Judge the clause at a step, which is then over. Initial values of the plan are not remembered."""
-        truth = watched.truth_of(values, solver)
+        truth = watched.truth_of(values)
         if self.silence is not None and self.silence.spared is not None:
             self.silence.elapsed, self.silence.spared = self.silence.spared, None
             if truth and watched.clause.kind is ClauseKind.GUARANTEE:

@@ -264,13 +264,13 @@ class Watched:
         """The clause, for people."""
         return self.clause.sentence or self.clause.text or show_term(self.clause.formula, "unicode")
 
-    def truth_of(self, values: Mapping[str, Value], solver: bool) -> bool | None:
-        """Whether it holds of the values; None if neither evaluation nor, if `solver`, Z3 can decide."""
+    def truth_of(self, values: Mapping[str, Value]) -> bool | None:
+        """Whether it holds of the values; None if neither evaluation nor Z3 can decide."""
         try:
             return bool(self.holds(values if self.steps is None else self.steps.at(values)))
         except NotEvaluable as error:
             known = values if self.steps is None else self.steps.known(values)
-            answer = judge(self.clause.formula, known, effort=JUDGE_EFFORT) if solver else None
+            answer = judge(self.clause.formula, known, effort=JUDGE_EFFORT)
             if answer is None and not self.tally.reason:
                 self.tally.reason = (self.steps.unknown if self.steps is not None else "") or error.reason
             return answer
@@ -340,14 +340,12 @@ def shown(watched: Watched, snapshot: Mapping[str, Value]) -> tuple[Shown, Shown
     return values, tuple((n, show(v)) for n, v in bindings.items())
 
 
-def open_verdict(
-    watched: Watched, assumptions: Sequence[Watched], values: Mapping[str, Value], solver: bool
-) -> bool | None:
+def open_verdict(watched: Watched, assumptions: Sequence[Watched], values: Mapping[str, Value]) -> bool | None:
     """Whether a guarantee holds for every value of the unknown variables; None if that depends on them, or cannot be
     decided. It is broken only if all assumptions are known to hold."""
     truth = judge_open(watched.clause.formula, values, effort=JUDGE_EFFORT)
     if truth is False:
         for assumed in assumptions:
-            if any(n not in values for n in assumed.names) or assumed.truth_of(values, solver) is not True:
+            if any(n not in values for n in assumed.names) or assumed.truth_of(values) is not True:
                 return None
     return truth

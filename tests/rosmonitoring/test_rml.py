@@ -141,7 +141,7 @@ def test_the_papers_agent_is_monitored_in_rml_as_by_the_engine(case: System, nom
     for at in commands[1::4]:
         for change in changes:
             events = [{**e, **change} if k == at else e for k, e in enumerate(nominal)]
-            interpreter, monitor = Interpreter(text), Monitor(found, solver=False)
+            interpreter, monitor = Interpreter(text), Monitor(found)
             rejected = next((k for k, e in enumerate(events) if interpreter.step(e) == "false"), None)
             faults = [monitor.step(e) for e in events]
             guarantees = {g.name for g in case.contract.node("agent").guarantees}
