@@ -153,7 +153,7 @@ class Blame:
             unseen = [str(source) for source in sources if source.node not in self.monitors]
             why = f"it came from {', '.join(map(str, sources))}, of which no guarantee was seen broken"
             if any(len(feeding) > 1 for feeding in edges.values()):
-                why = f"it came from {' or '.join(map(str, sources))}: whose message it was is not told"
+                why = f"it came from {' or '.join(map(str, sources))}: the publisher of the message is unknown"
             why += f" ({', '.join(unseen)} is not monitored)" if unseen else ""
             given = [f"in.{port}" for port, feeding in edges.items() if not feeding]
             why += f"; {', '.join(given)} came from the environment" if given else ""

@@ -61,7 +61,7 @@ from .watched import Violation, coverage, silent_topic
 )
 @click.option("--record", type=click.Path(path_type=Path), help="With --live: write all that is heard, as a trace.")
 @click.option(
-    "--verdicts", metavar="TOPIC", help="With --live: say verdicts there, as diagnostic_msgs/DiagnosticArray."
+    "--verdicts", metavar="TOPIC", help="With --live: publish verdicts there, as diagnostic_msgs/DiagnosticArray."
 )
 @click.option(
     "--timeline", type=click.Path(path_type=Path), help="Draw signals and violations there, as SVG (live: of --record)."
@@ -281,7 +281,7 @@ def _print_summary(running: Session) -> None:
                 click.echo(f"  {name}: {remedy}")
     if running.unheard:
         told = listed([f"{topic} ({count})" for topic, count in running.unheard.items()], 10)
-        click.echo(f"topics of the trace that no clause speaks of, and their events: {told}")
+        click.echo(f"topics of the trace that no clause uses, and their events: {told}")
         click.echo(f"topics listened to: {', '.join(running.topics) or 'none'}")
     summary = [f"{count} × {fault}" for fault, count in running.counts.items()]
     if not any(True for _ in running.clauses()):

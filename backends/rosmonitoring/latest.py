@@ -163,7 +163,7 @@ def not_met(
     found.append(monitor.violation(fault, watched.clause.name, event, why + late, watched, values))
 
 
-REMEMBERS = "it speaks of other steps and of several topics, whose order a running graph does not tell"
+REMEMBERS = "it refers to other steps and to several topics, whose order is unknown on a running graph"
 
 
 @dataclass(slots=True)

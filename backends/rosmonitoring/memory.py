@@ -426,7 +426,7 @@ def unmonitored(setup: Setup, clause: Clause) -> str:
         if hidden and about is not clause:
             return where + hidden[0]
         if not hidden and not triggers_of(setup, names):
-            return f"{where}it speaks of other steps, and no message makes one"
+            return f"{where}it refers to other steps, and no message makes one"
     return ""
 
 

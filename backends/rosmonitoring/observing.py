@@ -101,7 +101,7 @@ def _paths(entry: Mapping[str, Any], sort: s.Sort) -> tuple[FieldPath, ...]:
 
 def _decided(at: Observed, entry: Mapping[str, Any]) -> tuple[FieldPath, ...]:
     if isinstance(at.message, str):
-        about = f"nothing defines the messages {at.message}" if at.message else "the topic's type is not said"
+        about = f"nothing defines the messages {at.message}" if at.message else "the topic's type is unknown"
         raise Undecided(f"{about} of the topic {at.topic}, and the plan does not name the field", SOURCES)
     if "each" in entry or "take" in entry:
         raise Undecided("`each` and `take` want the fields named")
@@ -161,7 +161,7 @@ def _check_words(
     left = [member for member in sort.members if member not in names.values()]
     if left and not said:
         raise Wrong(
-            f"{shown(way)} is {wire}, and nothing says which number is {', '.join(left)}",
+            f"{shown(way)} is {wire}, and no number is known for {', '.join(left)}",
             "values",
             hint=f"values: {{0: {left[0]}, …}}, or the names of {holder.name}'s constants",
         )

@@ -206,7 +206,7 @@ class Timing:
             still = again
         topic = max(still, key=still.__getitem__, default=None)
         told = "" if topic is None else f"{still[topic]} messages of {topic}, one after another, have one time"
-        return f"{told}: such times say nothing of limits in seconds" if told else ""
+        return f"{told}: such times are no evidence for limits in seconds" if told else ""
 
     def hear(self, event: Event, topic: str, names: Iterable[str]) -> bool:
         """A message of one of the monitor's topics. Returns whether earlier ones were lost, or came out of order."""
@@ -277,11 +277,11 @@ class Clock:
     def finish(self) -> str:
         """Why the run is no evidence: the clock was never read, or did not advance."""
         if self._by is By.SIM and self._now is not None and not self._moved:
-            return f"/clock stood still, by which the plan goes (`time: {self._by}`)"
+            return f"/clock did not advance, and the plan uses it (`time: {self._by}`)"
         what = "no message of /clock came" if self._by is By.SIM else "no message had a `header.stamp`"
         if self._dropped and not self._waiting:
             what = f"more than {EVENTS_WITHOUT_CLOCK} events came before the first time"
-        return f"{what}, by which the plan goes (`time: {self._by}`)" if self._waiting or self._dropped else ""
+        return f"{what}, and the plan uses that clock (`time: {self._by}`)" if self._waiting or self._dropped else ""
 
     def _read(self, event: Event) -> Fraction | None:
         way: FieldPath = ("clock",) if self._by is By.SIM else ("header", "stamp")

@@ -190,7 +190,7 @@ class Pairing:
             said = Said(time, seconds, key, value, place)
             self._touched.append(said.key)
             if any(one.used and self._differ(name, one, said) for one in known.by_key.get(said.key, ())):
-                self.late = self.late or f"a message of {name} bears the key of one that was answered before"
+                self.late = self.late or f"a message of {name} has the key of one that was answered before"
             known.keep(said)
             return said
         if self.settled is not None and time <= self.settled:
@@ -284,7 +284,7 @@ class Pairing:
                 if value not in values:
                     values.append(value)
             if len(values) > 1 and self.answers.by != "latency":
-                return f"several messages of {name} bear the key"
+                return f"several messages of {name} have the key"
             distinct.append(values)
         if (count := math.prod(map(len, distinct))) > COMBINATIONS:
             return f"{count} combinations of inputs may have been answered"
@@ -324,7 +324,7 @@ class Pairing:
             return f"no message of {name} came"
         alike = known.by_key.get(asked.key)
         if not alike:
-            return f"no message of {name} bears the answer's {self.answers.by}: pair them in another way (`answers`)"
+            return f"no message of {name} has the answer's {self.answers.by}: pair them in another way (`answers`)"
         if len(alike) == 1:
             alike[0].used = True
             asked.since[name] = alike[0].seconds
@@ -367,8 +367,8 @@ def backwards(now: Fraction, latest: Fraction | None, number: int) -> str:
     if latest is None or now >= latest:
         return ""
     return (
-        f"event {number} has the time {show(now)} and an earlier one {show(latest)}: this is not the order of cause "
-        "(`answers: {by: arrival}`)"
+        f"event {number} has the time {show(now)} and an earlier one {show(latest)}: the order of arrival is "
+        "not that of cause (`answers: {by: arrival}`)"
     )
 
 

@@ -220,7 +220,7 @@ def decide(sort: Sort, message: Message, known: Definitions, values: Mapping[str
         every = ", ".join(f"{'.'.join(map(str, p))} : {w}" for p, w, _ in places[:CANDIDATES_SHOWN] if p) or "none"
         raise Undecided(f"no field of {message.name} can be read as it; its fields are {every}", hint)
     what = "field" if len(wanted) == 1 else f"{len(wanted)} fields"
-    which = f"which {what} of {message.name} it means is not said"
+    which = f"it may be read from more than one {what} of {message.name}"
     raise Undecided(f"{which}: {listed(told, CANDIDATES_SHOWN)}", hint)
 
 

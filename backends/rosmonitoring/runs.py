@@ -157,7 +157,7 @@ def _excuse(job: Job, runs: list[Run]) -> str:
     feeding = [e for e in dataflow(job.system).feeding(job.node.name) if e.target.port in spoken]
     late = " one step before" if any(e.delayed for e in feeding) else ""
     who = " and ".join(dict.fromkeys(str(e.source) for e in feeding))
-    told = f"by what {who} said{late}" if broken.fault is Fault.PROVIDER else "by the environment"
+    told = f"by a message of {who}{late}" if broken.fault is Fault.PROVIDER else "by the environment"
     about = ", ".join(f"{n} = {v}" for n, v in broken.values)
     why = f"({about}): {broken.cause}" if broken.cause else f"({about})"
     return f"the assumption {broken.clause} was broken {told}, first at event {broken.index} of {trace} {why}"

@@ -37,7 +37,7 @@ def readable(setup: Setup, path: Path, where: Origin) -> tuple[Diagnostic, ...]:
     topics = {name: same_topic(rule.topic) for name, rule in setup.carried.items()}
     said = {topic for name, topic in topics.items() if name.startswith(f"{Role.OUTPUT}.")}
     known = {topics[name]: who for name, (_, who) in setup.shared.items()}
-    hint = "model the others too, or say under `ros: {nodes: …}` how they are called: whose message it was is not told"
+    hint = "model the others too, or give their names under `ros: {nodes: …}`"
     for topic, who in found.publishers.items():
         modelled = known.get(same_topic(topic))
         if modelled is not None and (strange := [name for name in who if name not in modelled]):

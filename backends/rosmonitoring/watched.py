@@ -105,7 +105,7 @@ class Tally:
         """A message of a topic that other nodes publish too has come, without a record of its publisher."""
         self.published += 1
         self.nameless += 1
-        self.reason = self.reason or f"several nodes publish {topic}, and a message does not say whose it is"
+        self.reason = self.reason or f"several nodes publish {topic}, and a message does not name its publisher"
 
     reason: str = ""
     """Why it is not judged at all, or the first reason why a judgement was undecided."""
@@ -122,9 +122,9 @@ def coverage(tally: Tally) -> str:
         (tally.order, "undecided which input was answered {}"),
         (tally.early, "before the first value {}"),
         (tally.unreadable, "unreadable {}"),
-        (tally.nameless, "whose it was is not told {}"),
-        (tally.partial, "not part of a whole answer {}"),
-        (tally.forgotten, "undecided, since steps before went by unseen {}"),
+        (tally.nameless, "of an unknown publisher {}"),
+        (tally.partial, "part of an incomplete answer {}"),
+        (tally.forgotten, "undecided, since earlier steps were not seen {}"),
         (tally.supposed, "held by the plan's initial value, before any message {}"),
     ]
     told = ", ".join(words.format(count) for count, words in parts if count)
@@ -133,7 +133,7 @@ def coverage(tally: Tally) -> str:
     return f"published {tally.published} times" + (f": {told}" if told else "")
 
 
-DEPENDS = "it depends on which of its inputs the answer answered"
+DEPENDS = "it depends on which input the answer answered"
 
 
 def silent_topic(topic: str, heard: Iterable[str]) -> str:
@@ -151,14 +151,14 @@ def remedies(tally: Tally, silent: Mapping[str, str], unread: Mapping[str, str])
     late = ", ".join(name for name in tally.awaited if name not in silent and name not in unread)
     gone = ", ".join(dict.fromkeys(silent[name] for name in wanted if name in silent))
     wrong = "; ".join(f"{name}: {unread[name]}" for name in wanted if name in unread)
-    said = f"say what it was before its first message, mapping: {{{late.partition(',')[0]}: {{…, initial: …}}}}"
+    said = f"give its value before the first message, mapping: {{{late.partition(',')[0]}: {{…, initial: …}}}}"
     parts = (
         (gone, f"no message came on {gone}: correct the topic in the contract, or record it"),
         (wrong, f"a message could not be read: {wrong}"),
         (late, f"{late} had no value when answers came (a latched topic, or a late publisher): {said}"),
         (tally.order and tally.unpaired, "pair answers with inputs by a stamp or a key (`answers`)"),
         (tally.reason == DEPENDS, "pair answers by a stamp or a key, or measure a shorter latency (`answers`)"),
-        (LEAST_SHARE <= share < 1 and tally.triggered, f"say that less is enough, decided: {share:g}"),
+        (LEAST_SHARE <= share < 1 and tally.triggered, f"accept a smaller share, decided: {share:g}"),
     )
     return "; or ".join(words for applies, words in parts if applies)
 

@@ -210,17 +210,17 @@ def untold(setup: Setup, clause: Clause) -> str:
         return ""
     assert setup.answers is not None
     if setup.answers.by == "latency":
-        return "it speaks of other steps, whose order `answers: {latency: …}` does not tell"
+        return "it refers to other steps, whose order `answers: {latency: …}` does not determine"
     if timed(clause.formula) is not None:
-        return "it speaks of limits in seconds, which are judged by `answers: {by: arrival}` alone"
+        return "it has limits in seconds, which are judged with `answers: {by: arrival}` only"
     if setup.when != "outputs":
-        return f"it speaks of other steps, and with `when: {setup.when}` not every message is of one step"
+        return f"it refers to other steps, and with `when: {setup.when}` a message may belong to several steps"
     names = setup.carried
     if not setup.shared.keys().isdisjoint(names):
-        return "it speaks of other steps, and several nodes publish a topic: whose step a message is of is not told"
+        return "it refers to other steps, and several nodes publish one of its topics: the step of a message is unknown"
     sides = [topics_of(setup, [n for n in names if n.startswith(f"{Role.OUTPUT}.") is out]) for out in (False, True)]
     both = sorted(sides[0].keys() & sides[1].keys())
-    return f"it speaks of other steps, and {both[0]} carries inputs and outputs" if both else ""
+    return f"it refers to other steps, and {both[0]} carries inputs and outputs" if both else ""
 
 
 ALONE = "a message has no counterparts, or they came in another order: a step may have gone by unseen"

@@ -131,8 +131,8 @@ DELAYED = '[{"from": "guard.t", "to": "motor.t", "delayed": true, "initial": 0}]
 @pytest.mark.parametrize(
     ("connections", "told"),
     [
-        ("[]", "at the others the assumption nonneg was broken by what guard.t said, first at event 3 of t.jsonl"),
-        (DELAYED, "by what guard.t said one step before"),
+        ("[]", "at the others the assumption nonneg was broken by a message of guard.t, first at event 3 of t.jsonl"),
+        (DELAYED, "by a message of guard.t one step before"),
     ],
 )
 def test_recorded_evidence_says_what_was_broken_before_it_and_by_whom(

@@ -112,7 +112,7 @@ def test_headers_are_never_meant(make_system: Callable[..., System]) -> None:
         ("REAL", {"field": "x", "take": "min"}, "float64 x", "x is float64, and no array"),
         ("REAL", {"field": "x", "nan": "none"}, "float64 x", "`none` wants a relation"),
         ("Level", {"field": "x", "values": {"BAD": "error"}}, "uint8 OK=0\nuint8 x", "neither a number nor a constant"),
-        ("Level", "x", "uint8 OK=0\nuint8 x", "which number is error"),
+        ("Level", "x", "uint8 OK=0\nuint8 x", "no number is known for error"),
         ("NATURAL", {"field": "x", "values": {"on": "1"}}, "uint8 x", "gives names to values, and NATURAL has none"),
         ("REAL", {"field": "x", "values": {"1": "2"}}, "float64 x", "gives names to values, and REAL has none"),
         ("Two", "x", "float64[3] x", "x is float64[3], which cannot be read as (REAL, REAL)"),

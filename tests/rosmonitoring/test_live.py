@@ -117,7 +117,7 @@ def test_what_a_graph_says_is_judged_and_recorded(
     record = tmp_path / "run.jsonl"
     system = make_system(RCL, MAPPING)
     found, warned = heard(master, system, say, lambda running: running.events == 4, record)
-    assert [w.partition(":")[0] for w in warned] == ["nothing orders the topics of a graph"]
+    assert [w.partition(":")[0] for w in warned] == ["the topics of a running graph have no common order"]
     assert [(v.clause, v.index) for v in found] == [("low", 3)]
     assert [json.loads(line)["data"] for line in record.read_text("utf-8").splitlines()] == [1.5, 119.0, 120.5, 7.0]
     again = [(v.clause, v.index) for _, v in session(system).run(record)]
@@ -328,7 +328,7 @@ def test_a_graph_behind_rosbridge(make_system: Callable[..., System]) -> None:
         found = list(follow(running, graph, over, None, "/verdicts", warned.append))
         listening.shutdown()
     assert [(v.clause, v.index) for v in found] == [("low", 2), ("out.s", 3)]
-    assert warned[1:] == ["rosbridge: something is wrong", "rosbridge said what is no message"]
+    assert warned[1:] == ["rosbridge: something is wrong", "rosbridge sent something that is not a message"]
     published = [one for one in asked if one["op"] == "publish"]
     levels = {status["name"]: status["level"] for status in published[-1]["msg"]["status"]}
     assert levels == {"n.low": 2, "n.out.s": 2}

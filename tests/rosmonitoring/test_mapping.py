@@ -281,7 +281,10 @@ def test_a_field_named_as_what_the_event_says_itself_is_the_messages(
     assert [v.fault for v in monitor.step({"topic": "s", "time": 2, "data": {field: 5.5}})] == [Fault.GUARANTEE]
     assert [v.fault for v in monitor.step({"topic": "s", "time": 2, "data": "x"})] == [Fault.MAPPING]
     assert monitor.values == {}
-    assert "bears the name" in translate(found, system.contract.node("n").guarantees).refused["g"]
+    assert (
+        "has the name of a key of the event itself"
+        in translate(found, system.contract.node("n").guarantees).refused["g"]
+    )
 
 
 @pytest.mark.parametrize(

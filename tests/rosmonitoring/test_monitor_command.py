@@ -46,7 +46,7 @@ def test_topics_that_nobody_listens_to_are_told_with_those_that_are() -> None:
     line = '{"topic": "/raditaion", "time": %d, "radiation": 1}'
     done = monitor(str(CASE), "-", "--node", "radiationSensor", stdin="\n".join(line % n for n in range(3)))
     assert done.returncode == 1
-    assert "topics of the trace that no clause speaks of, and their events: /raditaion (3)" in done.stdout
+    assert "topics of the trace that no clause uses, and their events: /raditaion (3)" in done.stdout
     told = next(row for row in done.stdout.splitlines() if row.startswith("topics listened to: "))
     assert "radiationStatus" in told
 

@@ -92,10 +92,10 @@ def test_a_part_that_breaks_whatever_the_rest_was_is_broken(
     assert (found.verdict, found.bound["published"] - found.bound["judged"]) == (Verdict.REFUTED, 0)
     found = judged(make_system, tmp_path, TWO.format("or"), events(*WHOLE, *tail))
     assert found.verdict is Verdict.UNKNOWN
-    assert "not part of a whole answer 1" in found.summary
+    assert "part of an incomplete answer 1" in found.summary
     found = judged(make_system, tmp_path, TWO.format("or"), events(*WHOLE, *tail), decided=0.9)
     assert found.verdict is Verdict.MONITORED
-    assert "not part of a whole answer 1" in found.summary
+    assert "part of an incomplete answer 1" in found.summary
     quiet = judged(make_system, tmp_path, TWO.format("and"), events(*WHOLE, ("r", 1.0), *tail))
     assert quiet.verdict is Verdict.MONITORED
 

@@ -217,7 +217,7 @@ def test_an_unread_step_is_no_evidence(make_system: Make, tmp_path: Path) -> Non
     del events[2:4]
     lost = outcome(system, events, tmp_path)
     assert lost.verdict is Verdict.UNKNOWN
-    assert "since steps before went by unseen 2" in lost.summary
+    assert "since earlier steps were not seen 2" in lost.summary
 
 
 TWO = """

@@ -154,7 +154,7 @@ def test_by_stamp(make_system: Callable[..., System]) -> None:
     events.append(stamped("s", 3, level="high"))
     _, tallies = judge(make_system(RCL, MAPPING, answers={"by": "stamp"}), events)
     assert (tallies["high"].decided, tallies["high"].order) == (1, 1)
-    assert "bears the answer's stamp" in tallies["high"].reason
+    assert "has the answer's stamp" in tallies["high"].reason
 
 
 @given(st.lists(st.tuples(st.sampled_from("rsx"), st.sampled_from((1, 12, "?")), st.integers(0, 40)), max_size=40))

@@ -25,8 +25,8 @@ from .ros1 import Ros1, master_of
 from .rosbridge import Rosbridge
 
 UNORDERED = (
-    "nothing orders the topics of a graph: by arrival, a breach is told {} s later, where it is one whichever message "
-    "came first, and is undecided else ({})"
+    "the topics of a running graph have no common order: by arrival, a breach is reported {} s later if it is one for "
+    "every order of the messages, and is undecided otherwise ({})"
 )
 
 

@@ -82,7 +82,7 @@ class Rosbridge:
             else:
                 self.inbox.trouble("", f"rosbridge: {str(found.get('msg', found))[:200]}")
         except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
-            self.inbox.trouble("", "rosbridge said what is no message")
+            self.inbox.trouble("", "rosbridge sent something that is not a message")
 
     def diagnostics(self, topic: str, system: str) -> Callable[[Sequence[Status]], None]:
         """A function that publishes verdicts on a topic."""

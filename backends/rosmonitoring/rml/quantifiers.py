@@ -28,7 +28,7 @@ from . import syntax as rml
 from .symbols import Points, Scalar, Symbol, Table, Tracked, Variant, code, constant, equal
 
 _INFINITE = (s.RealSort, s.IntegerSort, s.NaturalSort)
-_NOT_LIFTED = "it stands in a quantified formula within a term"
+_NOT_LIFTED = "it is in a quantified formula within a term"
 
 Bound = Mapping[str, Symbol]
 

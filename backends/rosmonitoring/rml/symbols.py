@@ -125,7 +125,7 @@ def pattern(topic: str, fields: Sequence[tuple[FieldPath, str]]) -> str:
         if not path:
             raise NotRml("a rule takes the whole message as one value")
         if path[0] in ENVELOPE:
-            raise NotRml(f"the field {path[0]} bears the name of what an event says itself")
+            raise NotRml(f"the field {path[0]} has the name of a key of the event itself")
         place = tree
         steps = [str(step) for step in path]
         for step in steps[:-1]:
@@ -258,7 +258,7 @@ def carried(rule: Rule, rules: dict[str, Rule], prefix: str) -> Symbol:
         if sort.result != s.BOOL:
             elsewhere = source.elsewhere if isinstance(source, Fields) else None
             if elsewhere is None:
-                raise NotRml(f"{name} is a function whose value elsewhere nothing says")
+                raise NotRml(f"{name} is a function without a value `elsewhere`")
             return Table(((parts[:-1], parts[-1]),), constant(elsewhere, sort.result))
         return Points(((compare("==", Name(f"{prefix}_p"), Number(Fraction(1))), parts),))
     return _named(sort, prefix, name)

@@ -249,7 +249,7 @@ class _Machine:
         """The rules that matter, and the symbols of their variables."""
         wanted = list(names)
         for name in wanted:
-            several = f"several nodes publish the topic of {name}, and an event does not say whose it is"
+            several = f"several nodes publish the topic of {name}, and an event does not name its publisher"
             if why := self.setup.hidden.get(name, several if name in self.setup.shared else ""):
                 raise rml.NotRml(why)
             rule = self.setup.rules[name]
