@@ -13,7 +13,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from avow.base.tuning.running import READER_SECONDS, SETTLED_NS
+from avow.base.tuning.running import SETTLED_NS
 
 PART = ".part"
 """Suffix of a file that is still being written; one that remains was left by a killed process."""
@@ -102,26 +102,10 @@ def _digest_as(path: Path, mark: tuple[int | str, ...]) -> str:
     return digest_file(path)
 
 
-def _open_special(path: Path) -> int:
-    """A device or a pipe, open for writing. A pipe without a reader for `READER_SECONDS` is an error: a reader (`-o
-    >(less)`) may open it a moment after Avow does."""
-    end = time.monotonic() + READER_SECONDS
-    while True:
-        try:
-            return os.open(path, os.O_WRONLY | os.O_NONBLOCK)
-        except OSError as error:
-            if error.errno != errno.ENXIO or time.monotonic() > end:
-                raise
-            time.sleep(0.01)
-
-
 def write_out(path: Path, content: str) -> None:
     """Write `content` to the user's path: as `write`, but a device or a pipe is not replaced. Raises OSError."""
     if path.exists() and not path.is_file() and not path.is_dir():
-        descriptor = _open_special(path)
-        os.set_blocking(descriptor, True)
-        with os.fdopen(descriptor, "w", encoding="utf-8") as stream:
-            stream.write(content)
+        path.write_text(content, "utf-8")
     else:
         write(path, content)
 

@@ -85,9 +85,9 @@ def find_workspace(start: Path) -> Workspace | None:
     return None
 
 
-def workspace(start: Path | None = None) -> Workspace:
+def workspace() -> Workspace:
     """The folder with contracts/ and dodo.py, at or above the current one. Raises Rejected."""
-    place = (start or Path.cwd()).resolve()
+    place = Path.cwd().resolve()
     found = find_workspace(place)
     if found is None:
         raise Rejected(

@@ -100,7 +100,7 @@ class PipelineReporter(ConsoleReporter):  # type: ignore[misc]
         self.runtime_errors.append(msg)
 
     def complete_run(self) -> None:
-        from avow.pipeline.summary import append_job_summary, print_obligations, print_summary, results_json
+        from avow.pipeline.summary import append_job_summary, print_summary, results_json
 
         results = self._state.results
         if sys.exc_info()[0] is None:
@@ -109,8 +109,6 @@ class PipelineReporter(ConsoleReporter):  # type: ignore[misc]
         with self._lock:
             self._clear()
         self._write_index()
-        if any(name.split(":")[0] == "obligations" for name in self._selected):
-            print_obligations(self._selected, self.outstream)
         broken = sorted(
             {name for f in self.failures if (name := system_of(f["task"].name))} - set(self._state.results.finished)
         )

@@ -37,7 +37,7 @@ STAGES = {
         "derive properties of systems from their nodes' contracts, and discharge the side conditions",
         "derive properties of {0} from its nodes' contracts, and discharge the side conditions",
     ),
-    "obligations": ("list every proof obligation", "list every proof obligation of {0}"),
+    "obligations": ("write the list of proof obligations", "write the list of proof obligations of {0}"),
     "export": ("generate each method's files from the contract", "generate the files of method {2} for {1}"),
     "discharge": ("run each method and record the evidence", "run method {2} on {1} and record the evidence"),
     "certify": ("have the kernel check the calculus' proofs", "have the kernel check the proofs about {0}"),

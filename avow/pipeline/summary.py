@@ -11,8 +11,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from avow.base.codec import Unreadable, document, from_text
-from avow.base.files import read_regular
+from avow.base.codec import document
 from avow.base.plain import count
 from avow.base.rendering import printable
 from avow.base.tuning.shown import GATE_REASON, WARNINGS
@@ -139,23 +138,3 @@ def _inline(text: str) -> str:
     """The text on one line, escaped for Markdown and HTML."""
     escaped = "".join(f"\\{c}" if c in "\\`*_[]<>|#" else c for c in " ".join(text.split()))
     return escaped.replace("&", "&amp;")
-
-
-def print_obligations(selected: Sequence[str], out: IO[str]) -> None:
-    """The proof obligations of the selected systems, as a table (`doit obligations`)."""
-    from avow.pipeline.workload import Listing
-
-    wanted = {name.partition(":")[2] for name in selected if name.startswith("obligations")} - {""}
-    console = Console(file=out, highlight=False, emoji=False)
-    for path in sorted(Path("artifacts").glob("*/obligations.json")):
-        if wanted and path.parent.name not in wanted:
-            continue
-        table = Table("obligation", "claim", "settled by", box=None, header_style="bold", title=path.parent.name)
-        try:
-            listed = from_text(Listing, read_regular(path)).obligations
-        except (OSError, Unreadable) as error:
-            console.print(escape(f"{path} cannot be read: {error}"))
-            continue
-        for o in listed:
-            table.add_row(escape(o.id.partition("/")[2]), escape(o.claim), escape(", ".join(o.methods) or "no method"))
-        console.print(table)

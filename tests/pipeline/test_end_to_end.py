@@ -328,13 +328,6 @@ def test_a_broken_system_does_not_stop_the_others(robot: Path) -> None:
     assert case(robot)["exit_code"] == 0
 
 
-@pytest.mark.slow
-def test_obligations_are_shown_as_a_table(robot: Path) -> None:
-    done = verify(robot, "obligations")
-    assert done.returncode == 0, done.stderr
-    assert "thermostat/guarantee/warms" in done.stdout
-
-
 def test_init_overwrites_nothing(made: Path) -> None:
     done = run(made.parent, "avow", "init", "robot")
     assert done.returncode == 2

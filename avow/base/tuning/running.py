@@ -68,9 +68,6 @@ end, and each look at 100,000 takes a tenth of what an edit costs."""
 COLLECTED_IN_WORKS = 100_000
 """The same in a worker, where what is found may hold a solver's memory."""
 
-READER_SECONDS = 2
-"""How long a pipe that is written to may have no reader yet: who starts both starts the reader at once."""
-
 SAMPLE_TRIES = 12
 """Draws for one case that meets the assumptions; then any is taken, which validates all the same."""
 
