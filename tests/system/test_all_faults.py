@@ -177,16 +177,6 @@ def test_what_is_no_yaml_is_told_in_words(text: str, said: str, tmp_path: Path) 
     assert not re.search(r"token|scalar|flow|block|stream", fault.message)
 
 
-def test_a_keyword_as_a_name_is_called_so(tmp_path: Path) -> None:
-    folder = place(tmp_path, [])
-    (folder / "system.rcl").write_text(
-        CONTRACT.replace("node thermostat", "node exists").replace("mode : Mode", "or : Mode")
-    )
-    done = CliRunner().invoke(command("check"), [str(folder)], standalone_mode=False)
-    assert "`exists` is a keyword and cannot be a name" in done.output
-    assert "`or` is a keyword and cannot be a name" in done.output
-
-
 WIRED = """
 node a { inputs( ) outputs( x : REAL ) topics( float64 t matches(out.x) ) guarantee g ( out.x >= 0 ) }
 node b { inputs( y : REAL ) outputs( o : REAL ) topics( float32 t matches(in.y), float64 cmd matches(out.o) )
