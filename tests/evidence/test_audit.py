@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
@@ -78,6 +79,15 @@ def test_a_poisoned_cache_entry(ledger: Ledger, tmp_path: Path) -> None:
     ledger.append(evidence(claim, obligation_digest=sha256("another claim")))
     known = {"obligations": {claim.id: claim.digest}, "keys": {(claim.id, "hoare"): key_of(claim, "hoare")}}
     assert (Fault.MISPLACED, claim.id, True) in faults(ledger, tmp_path, **known)
+
+
+def test_a_clock_that_is_set_back(ledger: Ledger, tmp_path: Path) -> None:
+    """Else a risk whose acceptance has expired would be accepted again."""
+    late = evidence("node.c", started="2999-01-01T00:00:00.000+00:00")
+    ledger.append_all([late, evidence("node.d")])
+    now = datetime(2026, 11, 25, tzinfo=UTC)
+    found = [(fault, serious) for fault, _, serious in faults(ledger, tmp_path, now=now) if fault is Fault.CLOCK]
+    assert found == [(Fault.CLOCK, True), (Fault.CLOCK, False)]
 
 
 def test_a_record_that_claims_more_than_its_method_can(ledger: Ledger, tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
-from drawn.contracts import CONTRACT
+from drawn.contracts import CONTRACT, Strange
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -123,6 +123,18 @@ def _accepted(contract: Contract, formatted: str) -> None:
 
 def _digests(contract: Contract) -> list[str]:
     return [node_digest(node, clause) for node in contract.nodes for clause in node.clauses]
+
+
+@pytest.mark.nightly
+@given(st.integers(0, 100_000))
+def test_contracts_made_from_their_types(seed: int) -> None:
+    """Names that are words of other languages, nested types, constants of every kind, comments anywhere."""
+    source = Strange(seed)
+    text = source.text()
+    if examine(text) is None:  # the generator does not see every rule of types
+        assert {d.code for d in check_text(text, "f")[1] if d.is_error} <= {"RCL220", "RCL302", "RCL303"}
+    laid_out = " ".join(layout.format_text(text, "f").split())
+    assert all(" ".join(comment.split()) in laid_out for comment in source.comments)
 
 
 @given(damaged())

@@ -1,23 +1,14 @@
-"""Round trips on contracts made from their types: names that are words of other languages, nested types, constants of
-every kind, comments anywhere. A long run: AVOW_FUZZ=5000."""
+"""What SMT-LIB has of a contract is read as it was meant; constants that are formulas read back."""
 
 from __future__ import annotations
-
-import os
-from dataclasses import replace
 
 import pytest
 from drawn.contracts import Strange
 
-from avow.formulas.formula import node_digest
 from avow.language.contract import Contract
-from avow.language.format import format_text
 from avow.language.load import check_text
 from avow.language.translate import FORMATS
 from avow.solving.smtlib import to_smtlib
-
-ROUNDS = max(60, int(os.environ.get("AVOW_FUZZ", "300")) // 4)
-SEED = int(os.environ.get("AVOW_FUZZ_SEED", "20261122"))
 
 
 def contract_of(text: str) -> Contract:
@@ -26,59 +17,18 @@ def contract_of(text: str) -> Contract:
     return contract
 
 
-def digests(contract: Contract) -> list[str]:
-    return [node_digest(node, clause) for node in contract.nodes for clause in node.clauses]
-
-
-def made() -> list[tuple[str, tuple[str, ...], Contract]]:
-    found = []
-    for seed in range(SEED, SEED + ROUNDS):
-        source = Strange(seed)
-        text = source.text()
-        contract, diagnostics = check_text(text, "f")
-        if contract is None:  # the generator does not see every rule of types
-            assert {d.code for d in diagnostics if d.is_error} <= {"RCL220", "RCL302", "RCL303"}, text
-            continue
-        found.append((text, tuple(source.comments), contract))
-    assert len(found) > 0.8 * ROUNDS
-    return found
-
-
-@pytest.mark.nightly
-def test_layout_keeps_everything() -> None:
-    for text, comments, contract in made():
-        formatted = format_text(text, "f")
-        assert format_text(formatted, "f") == formatted
-        again = contract_of(formatted)
-        assert replace(again, files=contract.files) == contract
-        assert digests(again) == digests(contract)
-        laid_out = " ".join(formatted.split())
-        assert all(" ".join(comment.split()) in laid_out for comment in comments), text
-
-
-@pytest.mark.nightly
-def test_translation_keeps_the_meaning() -> None:
-    for text, _, contract in made():
-        again = contract_of(FORMATS["rcl"](contract))
-        assert replace(again, files=contract.files) == contract, text
-        assert digests(again) == digests(contract)
-        for notation in ("text", "unicode", "latex", "json"):
-            assert FORMATS[notation](contract)
-
-
 @pytest.mark.nightly
 def test_smtlib_is_read_by_z3() -> None:
     import z3
 
     read = 0
-    for text, _, contract in made():
-        found = to_smtlib(contract)
-        if not found.text:
-            continue  # a range between bounds that are no numbers, as a value
-        for part in found.text.split("(reset)"):
-            assert len(z3.parse_smt2_string(part)) > 0, text
-        read += 1
-    assert read > ROUNDS / 2
+    for seed in range(100):
+        contract, _ = check_text(Strange(seed).text(), "f")
+        found = to_smtlib(contract).text if contract is not None else ""  # a range is no value there
+        for part in found.split("(reset)") if found else ():
+            assert len(z3.parse_smt2_string(part)) > 0, seed
+        read += bool(found)
+    assert read > 50
 
 
 @pytest.mark.parametrize("collection", ["{{{0}, {1}}}", "<{0}, {1}>", "<<{0}>(0), {1}>"])

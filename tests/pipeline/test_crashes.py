@@ -13,7 +13,6 @@ import subprocess
 import sys
 import time
 from dataclasses import replace
-from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
@@ -206,17 +205,3 @@ def test_a_file_that_cannot_grow(
     assert limited.returncode != 0, limited.stdout
     assert "Traceback" not in limited.stdout + limited.stderr
     is_whole(folder, undisturbed[0], answers(folder))
-
-
-@pytest.mark.nightly
-def test_a_clock_that_is_set_back_fails_the_gate(fresh: Path, tmp_path: Path) -> None:
-    """Else a risk whose acceptance has expired would be accepted again."""
-    folder = tmp_path / "robot"
-    shutil.copytree(fresh, folder)
-    assert avow(folder, "verify").returncode == 0
-    ledger = Ledger(Workspace(folder).ledger("thermostat"))
-    last = ledger.records()[-1].evidence
-    ledger.append(replace(last, started=datetime(2999, 1, 1, tzinfo=UTC).isoformat()))
-    done = avow(folder, "verify")
-    assert done.returncode == 1
-    assert "from the future" in done.stdout
