@@ -77,7 +77,7 @@ def _node(inputs: str = "", outputs: str = "b : BOOL", topics: str = "", clauses
 
 _FILE = (
     Code("RCL001", "no contract", "The file holds neither a context nor a node.", "// nothing yet"),
-    Code("RCL002", "unreadable file", "The file does not exist, is a folder, or is not readable."),
+    Code("RCL002", "unreadable file", "The file does not exist or is not readable."),
     Code("RCL003", "file too large", "Contracts have at most 4 MB and a million tokens."),
     Code("RCL004", "not UTF-8", "The place is the first byte that is not UTF-8."),
     Code("RCL005", "not a text", "The file holds a NUL character.", "node n\0"),
@@ -90,7 +90,7 @@ _FILE = (
     Code(
         "RCL007",
         "layout would change the contract",
-        "`avow fmt` would change the meaning of this part and leaves the file as it is. Please report this defect.",
+        "`avow fmt` would change the meaning of this part, which stays as it is. Please report this defect.",
     ),
 )
 
@@ -159,7 +159,7 @@ _SYNTAX = (
     Code(
         "RCL118",
         "part missing",
-        "A node has inputs, outputs and topics (possibly empty), and at least one guarantee.",
+        "A node has inputs, outputs and topics (possibly empty), and a guarantee.",
         "node n { outputs(b : BOOL) topics() guarantee(out.b) }",
     ),
     Code(
@@ -232,7 +232,7 @@ _NAMES = (
     Code(
         "RCL215",
         "clause name used twice",
-        "Clauses of a node have different names; unnamed ones are called A1, A2, … and G1, G2, … by position.",
+        "Clauses of a node have different names (unnamed ones: A1, A2, … and G1, G2, …).",
         _node(clauses="guarantee g (out.b) guarantee g (not out.b)"),
     ),
     Code(
@@ -267,7 +267,7 @@ _SORTS = (
     Code(
         "RCL302",
         "different types",
-        "Only values of one type can be compared or collected. INTEGER and NATURAL widen to REAL.",
+        "Only values of one type can be compared or collected.",
         "guarantee(out.status == in.level)",
     ),
     Code("RCL303", "wrong type", "Another type is needed here.", "guarantee(in.marked(in.level))"),
@@ -363,7 +363,7 @@ _LINTS = (
         "The topic matches no variable, so no monitor can use it.",
         _node(topics="bool t"),
     ),
-    _lint("RCL405", "variable without topic", "No topic carries the variable, so no monitor can see it.", _node()),
+    _lint("RCL405", "variable without topic", "No topic carries the variable, so no monitor sees it.", _node()),
     _lint(
         "RCL406",
         "two spellings",
@@ -398,7 +398,7 @@ _LINTS = (
     _lint(
         "RCL411",
         "variable on two topics",
-        "Two topics carry the variable; a monitor reads it from one of them.",
+        "A monitor reads the variable from one of two topics.",
         _node(topics="bool t matches(out.b), bool u matches(out.b)"),
     ),
     _lint(
@@ -426,7 +426,7 @@ _LINTS = (
     _lint(
         "RCL415",
         "sentence names what the formula does not",
-        "The formula does not mention an element that the sentence names.",
+        "The formula lacks an element that the sentence names.",
         'guarantee halt "At a high level it stops" (in.level > 3 -> out.status == high)',
     ),
     _lint(

@@ -81,7 +81,7 @@ PLAN_CODES = register(
         "PLAN113",
         "environment",
         "An environment assumption refers to inputs that nodes provide.",
-        "Refer only to the environment's inputs.",
+        "Use the environment's inputs only.",
     ),
     declare("PLAN114", "temporal property", "The text is no temporal property.", "Write it as in `docs/calculus.md`."),
     declare(
@@ -107,7 +107,7 @@ PLAN_CODES = register(
     declare(
         "PLAN130",
         "parameters",
-        "The file under `source: parameters` is no mapping of numbers, truth values and texts.",
+        "`parameters` is no mapping of numbers, truth values and texts.",
         "Write a YAML mapping; quote texts such as `off` and `1:30`.",
     ),
     declare(
@@ -132,7 +132,7 @@ PLAN_CODES = register(
     declare(
         "PLAN123",
         "start-up deadlock",
-        "Nodes in a loop wait for each other, and no delayed edge has an initial value.",
+        "Nodes in a loop wait for each other.",
         "Give one delayed output an initial value.",
         warning=True,
     ),
@@ -152,8 +152,8 @@ PLAN_CODES = register(
     declare(
         "PLAN135",
         "no derived contract with memory",
-        "A derived contract is about one step, but a clause refers to others.",
-        "Compare or export nodes without such clauses.",
+        "A derived contract is about one step.",
+        "Compare or export nodes without clauses about other steps.",
     ),
     declare(
         "PLAN126",

@@ -28,7 +28,7 @@ ROS_CODES = register(
         "ROS111",
         "topic of two types",
         "Publisher and subscriber of a topic have different message types.",
-        "Use one type, or remap one end under `ros`.",
+        "Use one type, or remap one end.",
     ),
     declare(
         "ROS112",
@@ -46,7 +46,7 @@ ROS_CODES = register(
     declare(
         "ROS114",
         "node hears itself",
-        "A node subscribes to its own topic without an initial value.",
+        "A node subscribes to its own topic.",
         "Add a delayed connection with an initial value.",
     ),
     declare(
@@ -59,13 +59,13 @@ ROS_CODES = register(
         "ROS116",
         "remapping the other way round",
         "A remapping seems reversed.",
-        "Write the name in the node's code first, then the robot's.",
+        "Write the name in the node's code first.",
         warning=True,
     ),
     declare(
         "ROS120",
         "no launch file",
-        "A launch file is no XML, YAML or Python launch description.",
+        "A launch file is no XML, YAML or Python.",
         "Correct the file.",
     ),
     declare(
@@ -85,13 +85,13 @@ ROS_CODES = register(
         "ROS123",
         "which started node",
         "Several started nodes may be this node.",
-        "Choose one under `ros: {nodes: {NODE: {name: /…}}}`, or give the launch file its `args`.",
+        "Choose one under `ros: {nodes: {NODE: {name: /…}}}`, or give `args`.",
     ),
     declare(
         "ROS124",
         "started and not modelled",
         "Launch files and contract have different nodes.",
-        "Name it under `ros: {nodes: …}` or `model`, or add it to the contract.",
+        "Name it under `ros` or `model`, or add it to the contract.",
         warning=True,
     ),
     declare(

@@ -24,7 +24,7 @@ WORKSPACE_CODES = register(
         "FRET002",
         "no FRETish sentence",
         "A sentence consists of scope, condition, component, `shall`, timing, `satisfy` and response.",
-        "Correct it at the place shown.",
+        "Correct it.",
     ),
     declare(
         "FRET003",
@@ -84,7 +84,7 @@ WORKSPACE_CODES = register(
         "BACKEND006",
         "single steps only",
         "The method cannot judge clauses about other steps.",
-        "Choose a method for runs, or remember the value in a port.",
+        "Use another method, or remember the value in a port.",
     ),
     declare(
         "BACKEND007",
@@ -114,14 +114,14 @@ WORKSPACE_CODES = register(
     declare(
         "REQS001",
         "unreadable requirements",
-        "The file cannot be read, is not UTF-8, or is no CSV.",
+        "The file cannot be read, or is no CSV in UTF-8.",
         "Give a CSV file with a header row, or ReqIF.",
     ),
     declare(
         "REQS002",
         "no requirements",
-        "The file has no rows, no column of texts, or no specification objects.",
-        "Name the column, or export the requirements again.",
+        "The file has no rows, texts, or specification objects.",
+        "Name the column, or export again.",
     ),
     declare(
         "REQS003",
@@ -193,7 +193,7 @@ WORKSPACE_CODES = register(
     declare(
         "SIGN006",
         "not what the ledger says",
-        "The report differs from the ledger, or contract and plan have changed since.",
+        "The report differs from the ledger, contract or plan.",
         "Run `avow verify`, read the report, then sign.",
     ),
     declare(
@@ -256,8 +256,8 @@ WORKSPACE_CODES = register(
     declare(
         "CLUSTER001",
         "no cluster's address",
-        "Anyone who reaches a scheduler can run code: only TLS, or this machine, is accepted.",
-        "Write `dask+tls://HOST:PORT`, or `dask+tcp://127.0.0.1:PORT`.",
+        "Anyone who reaches a scheduler can run code.",
+        "Use TLS, `dask+tls://HOST:PORT`, or this machine, `dask+tcp://127.0.0.1:PORT`.",
     ),
     declare(
         "CLUSTER002",
@@ -269,7 +269,7 @@ WORKSPACE_CODES = register(
         "CLUSTER003",
         "no cluster",
         "Dask is not installed, no scheduler answers, or it rejects the certificate.",
-        "Install `avow[cluster]`; start a scheduler (`docs/developers/scale.md`).",
+        "Install `avow[cluster]`; start a scheduler.",
     ),
     declare(
         "CLUSTER004",
@@ -286,7 +286,7 @@ WORKSPACE_CODES = register(
     declare(
         "CLUSTER006",
         "worker left the cluster",
-        "A worker cannot run jobs any more (full disk, upgraded Avow); others take over.",
+        "A worker cannot run jobs any more (full disk, upgraded Avow).",
         "Repair and restart it.",
     ),
     declare(
@@ -299,7 +299,7 @@ WORKSPACE_CODES = register(
         "DRIVE101",
         "no message class",
         "A message type is not defined, or has a field called `topic` or `time`.",
-        "Name its folder under `messages`, or the distribution under `ros`.",
+        "Name its folder under `messages`, or the distribution.",
     ),
     declare(
         "DRIVE102",
@@ -316,7 +316,7 @@ WORKSPACE_CODES = register(
     declare(
         "DRIVE104",
         "no such messages",
-        "The trace has no messages for the class, runs backwards, or has messages of another type.",
+        "The trace has no messages for the class, other types, or runs backwards.",
         "Give another trace.",
     ),
     declare(

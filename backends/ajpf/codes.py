@@ -34,7 +34,7 @@ CODES = register(
         "AJPF110",
         "wrong environment",
         "The environment's file cannot be read, names something undeclared, or has too many combinations.",
-        "Correct the place; see `docs/backends/ajpf.md`.",
+        "Correct it (`docs/backends/ajpf.md`).",
     ),
     declare(
         "AJPF119",
@@ -63,8 +63,8 @@ CODES = register(
     declare(
         "AJPF123",
         "wrong row",
-        "A row's pattern cannot be used, or its formula has variables that the pattern does not bind.",
-        "Bind each variable in the pattern.",
+        "A row's pattern cannot be used, or does not bind a variable of the formula.",
+        "Bind each variable.",
     ),
     declare(
         "AJPF124",
@@ -75,7 +75,7 @@ CODES = register(
     declare(
         "AJPF125",
         "no such guarantee",
-        "A property is for a guarantee that the node lacks, or has `forbids` without counting for a guarantee.",
+        "A property's guarantee does not exist, or is missing beside `forbids`.",
         "Correct the guarantee's name.",
     ),
     declare(

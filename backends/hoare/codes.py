@@ -14,7 +14,7 @@ CODES = register(
     declare(
         "HOARE200",
         "wrong name",
-        "A name is unknown, declared twice, in use, or allowed in formulas only.",
+        "A name is unknown, declared twice, in use, or for formulas only.",
         "Declare it, or use another name.",
     ),
     declare(

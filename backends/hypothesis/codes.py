@@ -8,7 +8,7 @@ CODES = register(
     declare(
         "HYPO100",
         "no subject",
-        "`subject` is missing and the node has no Python source, or it is not of the form file.py:function.",
+        "`subject` is not of the form file.py:function, or missing.",
         "Name the function to be tested.",
     ),
     declare(

@@ -14,7 +14,7 @@ CODES = register(
     declare(
         "PYTHON200",
         "not in the subset",
-        "The file has something that this method does not understand, so nothing is proved.",
+        "The method does not understand a part of the file.",
         "Rewrite it (`docs/backends/python.md`), or use another method.",
         warning=True,
     ),

@@ -28,7 +28,7 @@ CODES = register(
     declare(
         "REV111",
         "no record",
-        "The record has a wrong format, an unknown key, or a list or text in the wrong place.",
+        "The record has a wrong format or an unknown key.",
         "Correct it; see `docs/backends/review.md`.",
     ),
     declare(
@@ -92,6 +92,6 @@ CODES = register(
         "REV124",
         "name that looks like another",
         "A reviewer's name has an invisible character, mixed scripts, no letters, or is TBD.",
-        "Write it in the letters of one script.",
+        "Use letters of one script.",
     ),
 )

@@ -9,7 +9,7 @@ CODES = register(
         "MON101",
         "wrong mapping",
         "An entry of `mapping` does not say how a variable is read from messages.",
-        "Write what the message says; see `docs/backends/rosmonitoring.md`.",
+        "Correct it (`docs/backends/rosmonitoring.md`).",
     ),
     declare(
         "MON102",
@@ -61,8 +61,8 @@ CODES = register(
     declare(
         "MON205",
         "other messages",
-        "A bag's topic has another type than in the contract, or another definition of it.",
-        "Correct the type in the contract, or the definition that the plan names.",
+        "A bag's topic has another type than in the contract, or another definition.",
+        "Correct the contract's type or the plan's definition.",
     ),
     declare(
         "MON206",
@@ -79,7 +79,7 @@ CODES = register(
     declare(
         "MON301",
         "serving not installed",
-        "Serving an oracle, listening to rosbridge, or writing an MCAP needs a package.",
+        "Oracles, rosbridge and MCAP need a package.",
         "`pip install 'avow[monitor]'`.",
     ),
     declare(
@@ -103,8 +103,8 @@ CODES = register(
     declare(
         "MON306",
         "unknown type on DDS",
-        "Nothing defines the messages of a type that DDS names.",
-        "Name its `.msg` files under `messages`, or the distribution: `ros: {distro: humble}`.",
+        "Nothing defines the messages of a DDS type.",
+        "Name its `.msg` files under `messages`, or the distribution.",
     ),
     declare(
         "MON307",
