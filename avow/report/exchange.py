@@ -25,6 +25,14 @@ def render_json(case: Case) -> str:
     return json_text(to_json(case))
 
 
+def by_node(views: Iterable[ObligationView]) -> dict[str, list[ObligationView]]:
+    """The claims of each node, in the order given."""
+    found: dict[str, list[ObligationView]] = {}
+    for view in views:
+        found.setdefault(view.obligation.node, []).append(view)
+    return found
+
+
 def headline(view: ObligationView) -> str:
     """An obligation's state in a line: its refutation if there is one, else the newest evidence, else the status."""
     counting = view.records
@@ -57,8 +65,7 @@ def render_junit(case: Case) -> str:
     """A suite for the gates, one for the requirements, and one for each node. Refuted claims fail; claims that are not
     shown are skipped, never passed: the gates decide whether that matters."""
     suites = [_gates_suite(case), *([_requirements_suite(case)] if case.requirements else [])]
-    nodes = dict.fromkeys(view.obligation.node for view in case.obligations)
-    suites += [_suite(case, node, [v for v in case.obligations if v.obligation.node == node]) for node in nodes]
+    suites += [_suite(case, node, views) for node, views in by_node(case.obligations).items()]
     total = [sum(numbers) for numbers in zip(*(suite[1] for suite in suites), strict=True)]
     head = f"<testsuites name={_attribute(case.system)} {_numbers(total)}>"
     return '<?xml version="1.0" encoding="UTF-8"?>\n' + head + "\n" + "".join(s[0] for s in suites) + "</testsuites>\n"
@@ -233,9 +240,8 @@ def _sarif_level(view: ObligationView, case: Case) -> tuple[str, str]:
 def render_attestation(case: Case) -> str:
     """in-toto statements (v1) with test-result predicates (v0.1): one for the system, then one for each node."""
     every = [_statement(case, "", list(case.obligations), _result_of(case))]
-    nodes = dict.fromkeys(view.obligation.node for view in case.obligations)
-    for node in nodes:
-        views = [view for view in case.obligations if view.obligation.node == node and not view.advice]
+    for node, own in by_node(case.obligations).items():
+        views = [view for view in own if not view.advice]
         good = all(_passes(case, view) for view in views)
         bad = any(tone(view.status) == "bad" and not view.handled for view in views)
         every.append(

@@ -18,6 +18,7 @@ from avow.assurance.naming import derivation_claim, is_foundation
 from avow.assurance.relied import agrees, upper_bound
 from avow.base.plain import count, listed
 from avow.base.records import dataclass
+from avow.base.remembered import by_identity
 from avow.base.verdict import Link, Object
 from avow.evidence.obligation import Kind, ProgramClaim
 from avow.evidence.record import Evidence
@@ -94,6 +95,7 @@ class Module:
     elements: tuple[Element, ...] = field(default=())
 
 
+@by_identity(1)
 def argument(case: Case) -> tuple[Module, ...]:
     """The whole argument: the system's module first, then requirements, nodes and general questions."""
     return tuple(_Argument(case).modules())
@@ -390,7 +392,7 @@ class _Argument:
             yield Defeater("the solver is wrong", "two solvers answered each question" if twice else other)
 
     def linked(self, view: ObligationView, record: Evidence) -> str:
-        found = agrees(self.case.obligations, view.obligation, record.method)
+        found = agrees(self.links, view.obligation, record.method)
         return f"the program agrees with it: {found}" if found is not None and found.supports else ""
 
 

@@ -30,11 +30,7 @@ def render_markdown(case: Case) -> str:
         _table(
             ("gate", "", "why"),
             (
-                (
-                    escaped(g.title),
-                    f"**{g.state}**" if g.state == "fails" else g.state,
-                    escaped(gate_line(g.reason)),
-                )
+                (escaped(g.title), f"**{g.state}**" if g.state == "fails" else g.state, escaped(gate_line(g.reason)))
                 for g in case.gates
             ),
         ),

@@ -28,16 +28,12 @@ from avow.backend_kit.timeline import in_words, picture, timelines
 from avow.base.files import sha256, write
 from avow.base.notes import cache_folder, sealed, unsealed
 from avow.base.plain import count
+from avow.base.remembered import by_identity
 from avow.base.tuning.bounds import SUPPORT_STEPS
-from avow.base.tuning.shown import (
-    FINDING_CHARACTERS,
-    GUARANTEE_ROWS,
-    OBLIGATIONS_IN_FULL,
-    ROWS_UNFOLDED,
-)
+from avow.base.tuning.shown import FINDING_CHARACTERS, GUARANTEE_ROWS, OBLIGATIONS_IN_FULL, ROWS_UNFOLDED
 from avow.evidence.obligation import SYSTEM_LEVEL, Kind
 from avow.evidence.status import Status, weigh
-from avow.report import example, source, wording
+from avow.report import example, exchange, source, wording
 from avow.report.maps import draw_map
 from avow.report.wording import history
 
@@ -188,6 +184,7 @@ def _fill(template: str, case: Case, **more: Any) -> str:
     )
 
 
+@by_identity(1)
 def known_pages(case: Case) -> dict[str, str]:
     """Each obligation, with the page that shows all of it."""
     return {view.id: wording.page_of(view.obligation.node) for view in case.obligations}
@@ -195,10 +192,7 @@ def known_pages(case: Case) -> dict[str, str]:
 
 def by_node(case: Case) -> dict[str, list[ObligationView]]:
     """Every obligation, in reading order: the nodes in the contract's order, then the whole system."""
-    found: dict[str, list[ObligationView]] = {}
-    for view in sorted(case.obligations, key=_reading_order(case)):
-        found.setdefault(view.obligation.node, []).append(view)
-    return found
+    return exchange.by_node(sorted(case.obligations, key=_reading_order(case)))
 
 
 _SUBSCRIPT = re.compile(r"(?<!\w)([𝒜𝒢io])_([A-Za-z0-9_]+)")

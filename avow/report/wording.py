@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import re
 import shlex
 from collections.abc import Iterator, Mapping
@@ -64,6 +65,7 @@ def anchor(claim: str) -> str:
     return quote(claim, safe="/._-", errors="replace")
 
 
+@functools.cache
 def page_of(node: str) -> str:
     """The page with all of a node's claims; for claims of no single node, the whole system's page."""
     if node == SYSTEM_LEVEL:

@@ -28,7 +28,7 @@ from avow.base.diagnostics import Rejected
 from avow.base.verdict import Verdict
 from avow.evidence.obligation import Kind
 from avow.evidence.status import Status
-from avow.report import PDF, formats, render_all, write_index
+from avow.report import PDF, formats, goals, render_all, write_index
 from avow.report.exchange import render_attestation
 from avow.report.gsn import render_gsn
 from avow.report.pdf import write_pdf
@@ -245,6 +245,22 @@ def test_rendering_twice_changes_no_byte(tmp_path: Path) -> None:
 
 
 # -- traceability ---------------------------------------------------------------------------------------------------
+
+
+def test_the_argument_is_made_once_and_comparisons_are_sought_among_links_only(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    sought: list[list[object]] = []
+    made: list[Case] = []
+    module = goals._Argument
+    monkeypatch.setattr(goals, "agrees", lambda views, *of: sought.append(list(views)))
+    monkeypatch.setattr(goals, "_Argument", lambda of: (made.append(of), module(of))[1])
+    claims = [guarantee("a", f"g{k}") for k in range(3)]
+    found = case(system({"a": ["g0", "g1", "g2"]}), claims, [evidence(claim) for claim in claims])
+    assert {name for name, _ in formats(found)} >= {"sacm.xml", "gsn.yaml"}
+    assert made == [found]
+    assert sought
+    assert not any(sought), "no program was compared with a model"
 
 
 def test_orphans_both_ways() -> None:
