@@ -224,9 +224,7 @@ class Watch:
         return (holds, met, fails) if every else (_spread(known, holds), _spread(known, met), _spread(known, fails))
 
     def _column_of(self, name: str) -> Column:
-        column = self.column(name)
-        assert column is not None
-        return column
+        return self._columns[heard_through(self._rules[name])]
 
     def _judge(self, watched: Watched, codes: Mapping[str, int]) -> tuple[bool, bool, bool]:
         """Whether a clause holds for the values, whether its antecedent is met (also if it cannot be evaluated), and

@@ -93,28 +93,23 @@ def command(
     if configuration is not None:
         _configure(loaded, nodes, configuration)
         return 0
-    if enforce and live is None:
-        raise click.UsageError("--enforce goes with --live")
+    suffix = "" if record is None else record.suffix
+    for wrong, text in (
+        (enforce and live is None, "--enforce goes with --live"),
+        (sum(given is not None for given in (trace, live, port)) != 1, "give a TRACE, --live GRAPH or --serve PORT"),
+        (live and timeline and not record, "with --live, --timeline needs --record: it is drawn from the record"),
+        (suffix in (".mcap", ".bag", ".db3"), f"--record writes JSON lines, not {suffix}; --mcap writes verdicts"),
+        (timeline and not live and trace in (None, "-"), "--timeline needs a TRACE that can be read twice: a file"),
+        (mcap and port is not None, "--mcap needs a TRACE or --live"),
+    ):
+        if wrong:
+            raise click.UsageError(text)
     if live is not None:
-        if trace is not None or port is not None:
-            raise click.UsageError("give a TRACE, --live or --serve")
-        if timeline is not None and record is None:
-            raise click.UsageError("with --live, --timeline needs --record: it is drawn from the record")
-        if record is not None and record.suffix in (".mcap", ".bag", ".db3"):
-            raise click.UsageError(
-                f"--record writes JSON lines, not {record.suffix}; --mcap writes verdicts and margins"
-            )
         return _live(loaded, nodes, live, (seconds, host, enforce, record, verdicts), telling)
-    if timeline is not None and trace in (None, "-"):
-        raise click.UsageError("--timeline needs a TRACE that can be read twice: a file, or a folder")
     if port is not None:
-        if trace is not None or mcap is not None:
-            raise click.UsageError("give a TRACE or --serve, not both; --mcap is of a TRACE or --live")
         _serve(loaded, nodes, port)
         return 0
-    if trace is None:
-        raise click.UsageError("give a TRACE, or --serve PORT")
-    return _judge(loaded, nodes, trace, telling)
+    return _judge(loaded, nodes, str(trace), telling)
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy.typing as npt
 
@@ -30,10 +30,6 @@ from .rules import NOTHING_KNOWN
 from .told import readable
 from .traces import opened
 from .watched import Fault, Tally, Violation, remedies
-
-if TYPE_CHECKING:
-    from .engine import Monitor
-
 
 RAW = "_mon"
 """The suffix of a filtered topic's name under which its node publishes."""

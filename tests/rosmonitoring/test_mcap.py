@@ -225,7 +225,7 @@ def test_what_cannot_be_is_refused(
         ((str(trace), "--timeline", str(tmp_path / "x"), "--mcap", str(tmp_path / "x")), "two of the files are one"),
         ((str(trace), "--mcap", str(tmp_path)), "MON304"),
         (("--live", "ros1", "--record", str(tmp_path / "x.mcap")), "--record writes JSON lines, not .mcap"),
-        (("--serve", "0", "--mcap", str(tmp_path / "x.mcap")), "--mcap is of a TRACE or --live"),
+        (("--serve", "0", "--mcap", str(tmp_path / "x.mcap")), "--mcap needs a TRACE or --live"),
     ):
         assert monitor(tmp_path, *arguments) == 2
         assert words in " ".join(capsys.readouterr().err.split())

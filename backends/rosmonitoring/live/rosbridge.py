@@ -40,7 +40,7 @@ class Rosbridge:
         try:
             self._line: Any = self._stack.enter_context(connect(self.address, max_size=FRAME_BYTES))
             for topic in self.topics:
-                self._send({"op": "subscribe", "topic": topic})
+                self._line.send(json.dumps({"op": "subscribe", "topic": topic}))
         except (OSError, WebSocketException, ValueError, TimeoutError) as error:
             text = f"no rosbridge answers at {self.address}: {error}"
             raise Rejected(Diagnostic("MON303", text, hint="--live rosbridge:ws://host:9090")) from None
@@ -50,15 +50,12 @@ class Rosbridge:
     def __exit__(self, *_: object) -> None:
         self._stack.close()
 
-    def _send(self, message: dict[str, Any]) -> None:
-        self._line.send(json.dumps(message))
-
     def _say(self, message: dict[str, Any]) -> None:
-        """As `_send`; a closed connection is reported, not raised."""
+        """Send a message; a closed connection is reported, not raised."""
         from websockets.exceptions import WebSocketException
 
         try:
-            self._send(message)
+            self._line.send(json.dumps(message))
         except (OSError, WebSocketException) as error:
             self.inbox.trouble("", f"rosbridge: {error}")
 
