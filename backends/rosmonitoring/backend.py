@@ -67,9 +67,9 @@ class RosMonitoringBackend(Backend):
         from avow.ros.bags import digest_trace
 
         from .memory import unmonitored
+        from .notes import readings, unholdable
         from .options import setup
         from .overhead import overheads
-        from .told import readings, unholdable
 
         found, faults = setup(job.system, job.node, job.method.options)
         problems = [*faults, *readings(found, job.method.options.at("mapping")), *overheads(job)[1]]

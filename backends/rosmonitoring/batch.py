@@ -22,10 +22,10 @@ from avow.ros.bags import ENVELOPE, Channel, Event
 from avow.ros.definitions import FLOATS, Scalar
 from avow.ros.layout import Layout
 
+from .notes import number_of
 from .options import same_topic
 from .reading import Reader, at
 from .rules import Choice, FieldPath, Fields, Hold, Rule, paths_of
-from .told import number_of
 from .tuning import BATCH, BATCH_BYTES
 from .wires import LARGEST_SINGLE, MappingError
 

@@ -33,7 +33,7 @@ class _Origin:
 
 @dataclass(slots=True)
 class Blame:
-    """Traces breaches to their origin; `told` takes the violations of one event, of all nodes together."""
+    """Traces breaches to their origin; `with_causes` takes the violations of one event, of all nodes together."""
 
     system: System
     monitors: Mapping[str, Monitor]
@@ -50,7 +50,7 @@ class Blame:
         for edge in dataflow(self.system).edges:
             self._feeding.setdefault(edge.target.node, {})[edge.target.port] = edge
 
-    def told(self, violations: Sequence[Violation], *, over: bool = False) -> Iterator[Violation]:
+    def with_causes(self, violations: Sequence[Violation], *, over: bool = False) -> Iterator[Violation]:
         """The same violations, with their causes. Those that wait for a verdict on another node's answer are reported
         later, at the latest once the run is `over`."""
         origins: list[tuple[Violation, _Origin]] = []

@@ -294,16 +294,16 @@ def _spread(where: Flags, flags: Flags) -> Flags:
 
 
 class Columns:
-    """Feed it a trace. `told` receives the violations that the monitors find at one event, and may explain them;
+    """Feed it a trace. `explain` receives the violations that the monitors find at one event, and may explain them;
     `heard` receives topics, and the number of their events."""
 
     def __init__(
         self,
         monitors: Sequence[Monitor],
-        told: Callable[[list[Violation]], Iterable[Violation]] = lambda found: found,
+        explain: Callable[[list[Violation]], Iterable[Violation]] = lambda found: found,
         heard: Callable[[str, int], None] = lambda topic, count: None,
     ) -> None:
-        self._told, self._heard = told, heard
+        self._explain, self._heard = explain, heard
         self._watches = [Watch(monitor) for monitor in monitors]
         self._newest = -math.inf
         self._latest: object = None
@@ -348,7 +348,7 @@ class Columns:
             self._newest = max(self._newest, float(time_of(event)))
             self._latest = event["time"]
             if found := self._engine(event, line):
-                yield line, list(self._told(found))
+                yield line, list(self._explain(found))
 
     def _batch(self, batch: Batch) -> Found:
         newest, wrong = self._times(batch)
@@ -377,7 +377,7 @@ class Columns:
                 found = self._engine(batch.event(end), batch.lines[end]) if end < count else []
                 start, due = end + 1, end
             if found:
-                yield batch.lines[due], list(self._told(found))
+                yield batch.lines[due], list(self._explain(found))
 
     def _times(self, batch: Batch) -> tuple[Floats, Flags]:
         """The latest time so far, at each event, and the events whose time the engine has to judge: it goes back, or it

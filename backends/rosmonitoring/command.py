@@ -27,7 +27,7 @@ from avow.system.plan import System
 
 from .configuration import of_system
 from .engine import Monitor
-from .judged import Recorder, Telling
+from .judged import Recorder, ReportingMonitor
 from .lanes import Marks, signals, timeline
 from .observing import method_of, said
 from .options import origin
@@ -85,7 +85,7 @@ def command(
     """
 
     loaded = load_system(system_folder(system))
-    telling = _Output(as_json, show_all, timeline, mcap)
+    output = _Output(as_json, show_all, timeline, mcap)
     files = [path.resolve() for path in (record, timeline, mcap, configuration) if path is not None]
     files += [Path(trace).resolve()] if trace is not None and trace != "-" else []
     if len(set(files)) < len(files):
@@ -105,11 +105,11 @@ def command(
         if wrong:
             raise click.UsageError(text)
     if live is not None:
-        return _live(loaded, nodes, live, (seconds, host, enforce, record, verdicts), telling)
+        return _live(loaded, nodes, live, (seconds, host, enforce, record, verdicts), output)
     if port is not None:
         _serve(loaded, nodes, port)
         return 0
-    return _judge(loaded, nodes, str(trace), telling)
+    return _judge(loaded, nodes, str(trace), output)
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,7 +125,7 @@ class _Output:
     def monitor(self) -> type[Monitor]:
         """The class of the monitors."""
 
-        return Monitor if self.mcap is None else Telling
+        return Monitor if self.mcap is None else ReportingMonitor
 
 
 def _configure(system: System, nodes: tuple[str, ...], path: Path) -> None:
@@ -138,16 +138,16 @@ def _configure(system: System, nodes: tuple[str, ...], path: Path) -> None:
 
 def _live(
     system: System, nodes: tuple[str, ...], live: str,
-    how: tuple[float | None, str, bool, Path | None, str | None], telling: _Output,
+    how: tuple[float | None, str, bool, Path | None, str | None], output: _Output,
 ) -> int:  # fmt: skip
     from .live.follow import follow, graph_of
 
     seconds, host, enforce, record, verdicts = how
-    running = session(system, nodes, make=telling.monitor)
+    running = session(system, nodes, make=output.monitor)
     graph = graph_of(live, running, host, enforce=enforce, warn=_warn)
     with _until(seconds) as over:
         found = ((0, violation) for violation in follow(running, graph, over, record, verdicts, _warn))
-        return _told(running, found, str(record or ""), telling)
+        return _report(running, found, str(record or ""), output)
 
 
 @contextmanager
@@ -172,42 +172,42 @@ def _warn(text: str) -> None:
     click.echo(text, err=True)
 
 
-def _judge(system: System, nodes: tuple[str, ...], trace: str, telling: _Output) -> int:
+def _judge(system: System, nodes: tuple[str, ...], trace: str, output: _Output) -> int:
 
-    running = session(system, nodes, None if trace == "-" else Path(trace), telling.monitor)
+    running = session(system, nodes, None if trace == "-" else Path(trace), output.monitor)
     # each with the line of its event; the last line if it was found at the end of the run
     found = running.read(cast(io.BufferedReader, sys.stdin.buffer).read1) if trace == "-" else running.run(Path(trace))
-    return _told(running, found, trace, telling)
+    return _report(running, found, trace, output)
 
 
-def _told(running: Session, violations: Iterator[tuple[int, Violation]], trace: str, telling: _Output) -> int:
+def _report(running: Session, violations: Iterator[tuple[int, Violation]], trace: str, output: _Output) -> int:
     """Show the violations, and the results of each clause. Returns the exit code."""
 
     shown: list[dict[str, Any]] = []
     counts = Counter[tuple[str, str, str]]()
     marks = Marks()
     with ExitStack() as stack:
-        recorder = None if telling.mcap is None else stack.enter_context(_recorder(running, telling.mcap))
+        recorder = None if output.mcap is None else stack.enter_context(_recorder(running, output.mcap))
         for line, violation in violations:
             about = violation.node, violation.clause, violation.fault.value
             counts[about] += 1
             marks.note(violation)
             if recorder is not None:
                 recorder.found(violation)
-            if not telling.show_all and counts[about] > VIOLATIONS_SHOWN:
+            if not output.show_all and counts[about] > VIOLATIONS_SHOWN:
                 continue
-            if telling.as_json:
+            if output.as_json:
                 shown.append({**violation_json(violation), "line": line})
             else:
                 click.echo(violation.text())
-    if telling.timeline is not None:
-        _draw(running, Path(trace), marks, telling.timeline)
-    if telling.as_json:
+    if output.timeline is not None:
+        _draw(running, Path(trace), marks, output.timeline)
+    if output.as_json:
         digest = "" if trace in ("-", "") else digest_trace(Path(trace))
         whole = {**running.summary(), "trace": trace, "sha256": digest, "violations": shown}
         click.echo(document(whole))
     else:
-        for (node, clause, fault), count in () if telling.show_all else counts.items():
+        for (node, clause, fault), count in () if output.show_all else counts.items():
             if count > VIOLATIONS_SHOWN:
                 click.echo(f"… and {count - VIOLATIONS_SHOWN} more of {node}.{clause}: {fault} (--all shows them)")
         _print_summary(running)
@@ -219,8 +219,8 @@ def _recorder(running: Session, path: Path) -> Recorder:
 
     recorder = Recorder(path)
     for monitor in running.monitors:
-        if isinstance(monitor, Telling):
-            monitor.tell = recorder.judged
+        if isinstance(monitor, ReportingMonitor):
+            monitor.report = recorder.judged
     return recorder
 
 

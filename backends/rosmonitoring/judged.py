@@ -42,10 +42,10 @@ class Judgement:
 Margin = Callable[[Mapping[str, Value]], float | None]
 
 
-class Telling(Monitor):
-    """The engine itself; `tell` receives each judgement."""
+class ReportingMonitor(Monitor):
+    """The engine itself; `report` receives each judgement."""
 
-    tell: Callable[[Judgement], None] = staticmethod(lambda judgement: None)
+    report: Callable[[Judgement], None] = staticmethod(lambda judgement: None)
 
     def __post_init__(self) -> None:
         self._margins: dict[str, Margin | None] = {}
@@ -69,14 +69,14 @@ class Telling(Monitor):
         before = replace(watched.tally)
         Monitor._judge(self, watched, event, found, answer)
         time = self._now if self.word is None else time_of(event)
-        self._tell(watched, before, self.events, time, self._margin(watched, values))
+        self._report(watched, before, self.events, time, self._margin(watched, values))
 
     def judge_part(
         self, watched: Watched, parts: Mapping[str, Part], event: Mapping[str, Any], found: list[Violation]
     ) -> None:
         before = replace(watched.tally)
         Monitor.judge_part(self, watched, parts, event, found)
-        self._tell(watched, before, self.events, self._now, None)
+        self._report(watched, before, self.events, self._now, None)
 
     def verdict(self, watched: Watched, values: Mapping[str, Value]) -> Fault | str | None:
         margin = self._margin(watched, values)
@@ -89,7 +89,7 @@ class Telling(Monitor):
         Monitor.judge_answer(self, asked, choices, found)
         known = [margin for margin in self._cases if margin is not None]
         margin = min(known) if known and len(known) == len(self._cases) else None
-        self._tell(watched, before, asked.index, Fraction(asked.time) / TICKS, margin)
+        self._report(watched, before, asked.index, Fraction(asked.time) / TICKS, margin)
 
     def _margin(self, watched: Watched, values: Mapping[str, Value]) -> float | None:
         name = watched.clause.name
@@ -98,10 +98,10 @@ class Telling(Monitor):
         margin = self._margins[name]
         return None if margin is None or any(n not in values for n in watched.names) else margin(values)
 
-    def _tell(self, watched: Watched, before: Tally, event: int, time: Fraction, margin: float | None) -> None:
+    def _report(self, watched: Watched, before: Tally, event: int, time: Fraction, margin: float | None) -> None:
         verdict = _verdict_between(before, watched.tally)
         if verdict:
-            self.tell(Judgement(self.setup.node.name, watched.clause.name, event, time, verdict, margin, self._now))
+            self.report(Judgement(self.setup.node.name, watched.clause.name, event, time, verdict, margin, self._now))
 
 
 def _verdict_between(before: Tally, after: Tally) -> str:

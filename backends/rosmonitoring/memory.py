@@ -34,7 +34,7 @@ from .pace import Leeway
 from .pairing import time_of
 from .rules import Previous
 from .watched import Tally, Watched, trigger_of
-from .word import untold
+from .word import undetermined
 
 
 class _Unknown:
@@ -74,7 +74,7 @@ class Silence:
     """The time of its latest step."""
     elapsed: Fraction = Fraction(0)
     """The time from the latest step to the next, which is being judged."""
-    told: bool = False
+    reported: bool = False
     """Whether a breach since the latest step has been reported."""
     spared: Fraction | None = None
     """If the step that is being judged came a little after a deadline: the time to it, `elapsed` to the deadline."""
@@ -209,19 +209,19 @@ class Memory:
     def late(self, now: Fraction) -> Fraction | None:
         """The time at which silence broke the clause, if no message under way matters any more; returned once."""
         silence = self.silence
-        if silence is None or silence.told or silence.latest is None or self.lost:
+        if silence is None or silence.reported or silence.latest is None or self.lost:
             return None
         deadline = self.deadline
         if deadline is None or now <= deadline + self._leeway.grace:
             return None
-        silence.told = True
+        silence.reported = True
         return None if self.mute or (self.broke and deadline == silence.latest) else deadline
 
     @property
     def deadline(self) -> Fraction | None:
         """The time at which silence breaks the clause, unless a step comes before; None if it does not."""
         silence = self.silence
-        if silence is None or silence.latest is None or silence.told:
+        if silence is None or silence.latest is None or silence.reported:
             return None
         memory = self._keeper.memory
         if self._breaks is None or self._breaks[0] is not memory:
@@ -247,7 +247,7 @@ class Memory:
             if silence.elapsed > allowed:
                 silence.spared, silence.elapsed = silence.elapsed, allowed
         silence.latest = now if silence.latest is None else max(now, silence.latest)
-        silence.told = False
+        silence.reported = False
 
     def restart(self) -> None:
         """A new run begins: pending responses are dropped."""
@@ -255,7 +255,7 @@ class Memory:
         self._arrived.clear()
         self.lost = self.open = self.missed = False
         if self.silence is not None:
-            self.silence.latest, self.silence.elapsed, self.silence.told = None, Fraction(0), False
+            self.silence.latest, self.silence.elapsed, self.silence.reported = None, Fraction(0), False
 
     def at(self, values: Mapping[str, Value]) -> dict[str, Any]:
         """A step's valuation, in which operations on unknown values cannot be evaluated."""
@@ -416,7 +416,7 @@ def unmonitored(setup: Setup, clause: Clause) -> str:
         if not histories(about.formula):
             continue
         where = "" if about is clause else f"the assumption {about.name}: "
-        if setup.answers is not None and setup.answers.by != "arrival" and (reason := untold(setup, about)):
+        if setup.answers is not None and setup.answers.by != "arrival" and (reason := undetermined(setup, about)):
             return where + reason
         try:
             names = watch(about, Tally(), setup).names

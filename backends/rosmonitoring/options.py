@@ -29,7 +29,18 @@ from . import observing
 from .pace import NO_TIME, RATE, By, Leeway, Rate, duration
 from .pairing import NUMBER, Answers
 from .reading import Undecided, from_text, shown
-from .rules import NOTHING_KNOWN, Choice, Constant, FieldPath, Fields, Previous, Rule, of_latest, otherwise, told_only
+from .rules import (
+    NOTHING_KNOWN,
+    Choice,
+    Constant,
+    FieldPath,
+    Fields,
+    Previous,
+    Rule,
+    of_latest,
+    otherwise,
+    read_from_inputs,
+)
 from .traces import carried
 from .tuning import DECIDED_SHARE
 from .wires import MappingError, parts_of, table_of, whole
@@ -110,7 +121,7 @@ def setup(
     for port in (*node.inputs, *node.outputs):
         work.port(port)
     work.shared_fields()
-    for name, told in told_only(work.rules, work.mapping()):
+    for name, told in read_from_inputs(work.rules, work.mapping()):
         work.fault(f"it is read from the message that gives {told}", name, hint="name what the node publishes")
     filtered = work.filtered()
     data = observing.said(options)

@@ -15,7 +15,7 @@ import numpy as np
 
 from .answers import asks, speaks
 from .batch import NONE, UNREADABLE, Batch, Flags, Floats, Ints
-from .pairing import NUMBER, Pairing, Said, ticks_at
+from .pairing import NUMBER, InputMessage, Pairing, ticks_at
 from .rules import FieldPath
 from .tuning import COMBINATIONS, KEYS_KEPT, TICKS
 from .watched import DEPENDS, Watched
@@ -31,7 +31,7 @@ _NEVER = sys.maxsize
 class _Input:
     """The messages of one input: by latency, first those of earlier batches that may still be needed."""
 
-    before: Sequence[Said]
+    before: Sequence[InputMessage]
     rows: Ints
     """The rows in the batch; -1: of an earlier batch."""
     ids: Ints
@@ -40,7 +40,7 @@ class _Input:
     seconds: Floats
     used: Ints
     """For each message, the row at which the first answer is paired with it."""
-    said: dict[int, Said] = field(default_factory=dict)
+    kept: dict[int, InputMessage] = field(default_factory=dict)
 
 
 @dataclass(slots=True)
@@ -96,14 +96,14 @@ class Paired:
             known = pairing.seen.get(name)
             rows, codes = self._watch.known(name)
             # `place` 0: an initial value, whose answers the engine judges
-            kept = [said for said in known.messages if said.place] if known and self._times.size else []
+            kept = [message for message in known.messages if message.place] if known and self._times.size else []
             ids = self._ids(self._watch.topic(name), pairing.answers.input) if len(rows) else NONE
             self._inputs[name] = _Input(
                 kept,
                 np.concatenate((np.full(len(kept), -1), rows)),
-                np.concatenate((np.array([int(said.time // _NANO) for said in kept], np.int64), ids)),
-                np.concatenate((np.array([self._code(name, said) for said in kept], np.int64), codes)),
-                np.concatenate(([said.seconds for said in kept], self._batch.times[rows])),
+                np.concatenate((np.array([int(message.time // _NANO) for message in kept], np.int64), ids)),
+                np.concatenate((np.array([self._code(name, message) for message in kept], np.int64), codes)),
+                np.concatenate(([message.seconds for message in kept], self._batch.times[rows])),
                 np.full(len(kept) + len(rows), _NEVER),
             )
         asking: list[tuple[str, Watched, Ints]] = []
@@ -123,8 +123,8 @@ class Paired:
             if self._watch.plan(topic) is not None:
                 self._ask(watched, self._topics[topic], ids)
 
-    def _code(self, name: str, said: Said) -> int:
-        value, column = self._pairing.value_of(name, said), self._watch.column(name)
+    def _code(self, name: str, message: InputMessage) -> int:
+        value, column = self._pairing.value_of(name, message), self._watch.column(name)
         return UNREADABLE if value is None or column is None else column.code_of(value)
 
     def _ids(self, topic: str, path: FieldPath) -> Ints:
@@ -266,8 +266,8 @@ class Paired:
     def _hear(self, name: str, one: _Input, start: int, end: int) -> None:
         pairing = self._pairing
         for k in np.flatnonzero((one.used >= start) & (one.used < end)).tolist():
-            if k in one.said:
-                one.said[k].used = True
+            if k in one.kept:
+                one.kept[k].used = True
         low, high = np.searchsorted(one.rows, (start, end)).tolist()
         if low == high:
             return
@@ -279,9 +279,9 @@ class Paired:
         for k in range(first, high):
             row = int(one.rows[k])
             event, key = self._batch.event(row), keys[one.ids[k]] if keys else None
-            said = pairing.saw(name, ticks_at(event), float(one.seconds[k]), key, event, self._batch.lines[row])
-            said.used = bool(one.used[k] < end) and self._by != "latency"
-            one.said[k] = said
+            message = pairing.saw(name, ticks_at(event), float(one.seconds[k]), key, event, self._batch.lines[row])
+            message.used = bool(one.used[k] < end) and self._by != "latency"
+            one.kept[k] = message
 
     def _count(self, asked: _Asked, low: int, high: int) -> None:
         watched, batch, pairing = asked.watched, self._batch, self._pairing

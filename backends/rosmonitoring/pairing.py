@@ -103,7 +103,7 @@ class Asked:
 
 
 @dataclass(slots=True, eq=False)
-class Said:
+class InputMessage:
     """One message of an input. `value` None: it could not be read; an event: it has not been read yet."""
 
     time: Ticks
@@ -115,7 +115,7 @@ class Said:
     """An answer was paired with it, as the only one of its key."""
 
 
-Choices = list[list[Said]] | str
+Choices = list[list[InputMessage]] | str
 """The messages of each input that an answer may have answered, or why there are none."""
 
 
@@ -123,12 +123,12 @@ Choices = list[list[Said]] | str
 class _Seen:
     """The latest messages of one input, in the order of arrival (by latency: of time), and by their keys."""
 
-    messages: deque[Said] = field(default_factory=deque)
-    by_key: dict[object, list[Said]] = field(default_factory=dict)
+    messages: deque[InputMessage] = field(default_factory=deque)
+    by_key: dict[object, list[InputMessage]] = field(default_factory=dict)
 
-    def keep(self, said: Said) -> None:
-        self.messages.append(said)
-        self.by_key.setdefault(said.key, []).append(said)
+    def keep(self, message: InputMessage) -> None:
+        self.messages.append(message)
+        self.by_key.setdefault(message.key, []).append(message)
         if len(self.messages) > KEYS_KEPT:
             old = self.messages.popleft()
             alike = self.by_key[old.key]
@@ -174,43 +174,43 @@ class Pairing:
 
     def later(self, name: str, time: Fraction) -> int:
         """The number of messages of an input that are later than a time, as far as they are kept."""
-        return sum(said.time > ticks(time) for said in self.input(name).messages)
+        return sum(message.time > ticks(time) for message in self.input(name).messages)
 
     def begins(self, values: Mapping[str, Value]) -> None:
         """The values before any message: at no time and no place, so that they have no age."""
         for name, value in values.items():
-            self.input(name).messages.append(Said(-2 * LATEST_TIME * TICKS, math.inf, None, value, 0))
+            self.input(name).messages.append(InputMessage(-2 * LATEST_TIME * TICKS, math.inf, None, value, 0))
 
     def saw(
         self, name: str, time: Ticks, seconds: float, key: object, value: Value | Mapping[str, Any] | None, place: int
-    ) -> Said:
+    ) -> InputMessage:
         """A message of an input, at a place of the trace."""
         known = self.input(name)
         if self.answers.by != "latency":
-            said = Said(time, seconds, key, value, place)
-            self._touched.append(said.key)
-            if any(one.used and self._differ(name, one, said) for one in known.by_key.get(said.key, ())):
+            message = InputMessage(time, seconds, key, value, place)
+            self._touched.append(message.key)
+            if any(one.used and self._differ(name, one, message) for one in known.by_key.get(message.key, ())):
                 self.late = self.late or f"a message of {name} has the key of one that was answered before"
-            known.keep(said)
-            return said
+            known.keep(message)
+            return message
         if self.settled is not None and time <= self.settled:
             self.late = self.late or (
                 f"a message of {name} has the time {show(Fraction(time) / TICKS)}, and comes after answers up to then "
                 "were judged: by latency, a trace has to be in the order of time"
             )
-        messages, said = known.messages, Said(time, seconds, None, value, place)
+        messages, message = known.messages, InputMessage(time, seconds, None, value, place)
         if messages and messages[-1].time > time:
-            insort(messages, said, key=_time)
+            insort(messages, message, key=_time)
         else:
-            messages.append(said)
+            messages.append(message)
         # messages older than every open window, except the last of them, are no longer needed
         first = next(iter(self.waiting.values()), messages[-1]).time
         since = first - self.latency - 2 * self.jitter
         while len(messages) > 1 and messages[1].time <= since:
             messages.popleft()
-        return said
+        return message
 
-    def _differ(self, name: str, one: Said, other: Said) -> bool:
+    def _differ(self, name: str, one: InputMessage, other: InputMessage) -> bool:
         """Whether two messages have different values (an unreadable one always differs)."""
         values = self.value_of(name, one), self.value_of(name, other)
         return None in values or values[0] != values[1]
@@ -272,13 +272,13 @@ class Pairing:
         inputs = () if asked.key is None else asked.inputs
         return all(name in self.seen and asked.key in self.seen[name].by_key for name in inputs)
 
-    def cases(self, asked: Asked, choices: list[list[Said]]) -> list[dict[str, Value]] | str:
+    def cases(self, asked: Asked, choices: list[list[InputMessage]]) -> list[dict[str, Value]] | str:
         """The combinations of values that an answer may have answered, or why there are none."""
         distinct: list[list[Value | None]] = []
         for name, alike in zip(asked.inputs, choices, strict=True):
             values: list[Value | None] = [None] * (name in asked.unsaid)
-            for said in alike:
-                value = self.value_of(name, said)
+            for message in alike:
+                value = self.value_of(name, message)
                 if value is None and name not in asked.needless:
                     return f"a message of {name} could not be read"
                 if value not in values:
@@ -291,32 +291,32 @@ class Pairing:
         pairs = (zip(asked.inputs, values, strict=True) for values in itertools.product(*distinct))
         return [{**asked.known, **{name: value for name, value in one if value is not None}} for one in pairs]
 
-    def value_of(self, name: str, said: Said) -> Value | None:
-        if isinstance(said.value, Mapping):
-            said.value = self.readers[name](said.value, None)
-        return said.value
+    def value_of(self, name: str, message: InputMessage) -> Value | None:
+        if isinstance(message.value, Mapping):
+            message.value = self.readers[name](message.value, None)
+        return message.value
 
-    def current(self, name: str, asked: Asked) -> list[Said] | str:
+    def current(self, name: str, asked: Asked) -> list[InputMessage] | str:
         start = asked.time - self.latency - self.jitter
         end = asked.time + self.jitter
-        current: list[Said] = []
+        current: list[InputMessage] = []
         before = False
-        for said in self.seen[name].messages if name in self.seen else ():
-            if said.time <= start:
-                current, before = [said], True
-                asked.since[name] = said.seconds
-            elif said.time <= end:
-                current.append(said)
+        for message in self.seen[name].messages if name in self.seen else ():
+            if message.time <= start:
+                current, before = [message], True
+                asked.since[name] = message.seconds
+            elif message.time <= end:
+                current.append(message)
         if not before and name in asked.needless:
             asked.unsaid.add(name)
         elif not current:
             return EARLY
         elif not before:
             return f"{name} may have had no value yet"
-        asked.messages[name] = tuple(said.place for said in current)
+        asked.messages[name] = tuple(message.place for message in current)
         return current
 
-    def _same_key(self, name: str, asked: Asked) -> list[Said] | str:
+    def _same_key(self, name: str, asked: Asked) -> list[InputMessage] | str:
         if asked.key is None:
             return LOST if self.answers.by == "order" else "the answer has no key"
         known = self.seen.get(name)
@@ -330,8 +330,8 @@ class Pairing:
             asked.since[name] = alike[0].seconds
             asked.messages[name] = (alike[0].place,)
             return alike
-        asked.since[name] = min(said.seconds for said in alike)
-        asked.messages[name] = tuple(said.place for said in alike)
+        asked.since[name] = min(message.seconds for message in alike)
+        asked.messages[name] = tuple(message.place for message in alike)
         return [*alike]
 
     @staticmethod

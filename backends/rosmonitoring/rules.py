@@ -170,7 +170,7 @@ def paths_of(rule: Fields | Choice) -> tuple[FieldPath, ...]:
     return tuple(dict.fromkeys((rule.tag, *(p.key if isinstance(p, Lookup) else p for p in places))))
 
 
-def told_only(rules: Mapping[str, Rule], mapped: Iterable[str]) -> Iterator[tuple[str, str]]:
+def read_from_inputs(rules: Mapping[str, Rule], mapped: Iterable[str]) -> Iterator[tuple[str, str]]:
     """The outputs that the plan's mapping reads only from fields that give inputs, with these inputs: a node's input is
     no answer of it."""
     fields = {

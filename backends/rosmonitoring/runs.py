@@ -27,13 +27,13 @@ from avow.system.graph import dataflow
 from .engine import Monitor
 from .lanes import signals, timeline
 from .memory import unmonitored
+from .notes import readable
 from .observing import method_of
 from .options import Setup, origin, setup, usable
 from .overhead import overheads
 from .pairing import Answers
 from .rml.translate import translate
 from .session import Session
-from .told import readable
 from .traces import Recorded, read_trace
 from .verdicts import Run, Shown, outcome
 from .watched import Fault, Tally, Violation

@@ -24,10 +24,10 @@ from .batch import of_arrays, of_messages
 from .blame import Blame
 from .columns import Columns
 from .engine import Monitor
+from .notes import readable
 from .observing import NAME, method_of
 from .options import Setup, known_types, origin, same_topic, setup
 from .rules import NOTHING_KNOWN
-from .told import readable
 from .traces import opened
 from .watched import Fault, Tally, Violation, remedies
 
@@ -113,7 +113,7 @@ class Session:
     def step(self, event: Mapping[str, Any]) -> Iterator[Violation]:
         topic = event.get("topic")
         self.heard(topic if isinstance(topic, str) else "", 1)
-        yield from self.told([v for monitor in self.monitors for v in monitor.step(event)])
+        yield from self.with_causes([v for monitor in self.monitors for v in monitor.step(event)])
 
     def offer(self, event: Mapping[str, Any]) -> tuple[list[Violation], bool]:
         """The violations in a message of a filtered topic, and whether it may be passed on. Monitors of other nodes
@@ -129,11 +129,11 @@ class Session:
             self.withheld[topic] = self.withheld.get(topic, 0) + 1
         others = event if passed else {"topic": raw(topic), "time": event["time"]}
         found += [v for m in self.monitors if m not in own for v in m.step(others)]
-        return list(self.told(found)), passed
+        return list(self.with_causes(found)), passed
 
     def tick(self, event: Mapping[str, Any]) -> Iterator[Violation]:
         """Time has passed without a message."""
-        yield from self.told([v for monitor in self.monitors for v in monitor.tick(event)])
+        yield from self.with_causes([v for monitor in self.monitors for v in monitor.tick(event)])
 
     def heard(self, topic: str, count: int) -> None:
         """`count` events of a topic (without a name: of none) have come."""
@@ -149,7 +149,7 @@ class Session:
 
     def judged(self, path: Path) -> Iterator[tuple[int, list[Violation]]]:
         """As `run`: lines, and the violations there, often none, so that the caller can check the clock."""
-        columns = Columns(self.monitors, self.told, self.heard)
+        columns = Columns(self.monitors, self.with_causes, self.heard)
         return self._whole(self._of_bag(path, columns) if is_bag(path) else columns.run(path))
 
     def _of_bag(self, path: Path, columns: Columns) -> Iterator[tuple[int, list[Violation]]]:
@@ -160,12 +160,12 @@ class Session:
     def arrays(self, topics: Mapping[str, Mapping[str, npt.NDArray[Any]]]) -> Iterator[tuple[int, Violation]]:
         """As `run`, for arrays: topic → field (`time` in seconds, `data`, `pose.x`) → a number for each message. The
         number of the event replaces the line."""
-        batches = Columns(self.monitors, self.told, self.heard).batches(of_arrays(topics))
+        batches = Columns(self.monitors, self.with_causes, self.heard).batches(of_arrays(topics))
         return ((line, violation) for line, found in self._whole(batches) for violation in found)
 
     def read(self, read: Callable[[int], bytes]) -> Iterator[tuple[int, Violation]]:
         """As `run`, for lines of standard input as they come, as `Columns.lines`. Raises Rejected, OSError."""
-        lines = Columns(self.monitors, self.told, self.heard).lines(read, "<stdin>")
+        lines = Columns(self.monitors, self.with_causes, self.heard).lines(read, "<stdin>")
         return ((line, violation) for line, found in self._whole(lines) for violation in found)
 
     def _whole(self, judged: Iterable[tuple[int, list[Violation]]]) -> Iterator[tuple[int, list[Violation]]]:
@@ -175,19 +175,19 @@ class Session:
             yield line, found
         yield line, list(self.finish())
 
-    def told(self, violations: list[Violation], *, over: bool = False) -> Iterator[Violation]:
+    def with_causes(self, violations: list[Violation], *, over: bool = False) -> Iterator[Violation]:
         """The violations at one event, with their causes."""
         if not violations and not over:
             return
         if self._blame is None:
             self._blame = Blame(self.system, {m.setup.node.name: m for m in self.monitors})
-        for violation in self._blame.told(violations, over=over):
+        for violation in self._blame.with_causes(violations, over=over):
             self.counts[violation.fault] = self.counts.get(violation.fault, 0) + 1
             yield violation
 
     def finish(self) -> Iterator[Violation]:
         """The violations that are found only at the end of the run."""
-        yield from self.told([v for monitor in self.monitors for v in monitor.finish()], over=True)
+        yield from self.with_causes([v for monitor in self.monitors for v in monitor.finish()], over=True)
         _report_withheld(self.monitors, self.behind_filters)
 
     def unmonitored(self) -> dict[str, str]:

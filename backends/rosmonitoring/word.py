@@ -187,7 +187,7 @@ def word_of(setup: Setup, clauses: Iterable[Clause]) -> Word | None:
     """The word of some clauses that are judged together; None if it judges none that speaks of other steps."""
     if setup.answers is None or setup.answers.by == "arrival":
         return None
-    told = [clause for clause in clauses if not untold(setup, clause)]
+    told = [clause for clause in clauses if not undetermined(setup, clause)]
     if not any(histories(clause.formula) for clause in told):
         return None
     return Word(setup.answers, topics_of(setup, {v.qualified for c in told for v in free_variables(c.formula)}))
@@ -204,7 +204,7 @@ def topics_of(setup: Setup, names: Iterable[str]) -> dict[str, bool]:
     }
 
 
-def untold(setup: Setup, clause: Clause) -> str:
+def undetermined(setup: Setup, clause: Clause) -> str:
     """Why `answers` (other than by arrival) does not determine the steps of a clause; empty if it does."""
     if not histories(clause.formula):
         return ""

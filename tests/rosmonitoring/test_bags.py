@@ -10,10 +10,10 @@ from typing import Any
 import pytest
 
 from avow.backends.rosmonitoring.engine import Monitor
+from avow.backends.rosmonitoring.notes import readable
 from avow.backends.rosmonitoring.options import known_types, origin, setup
 from avow.backends.rosmonitoring.pairing import time_of
 from avow.backends.rosmonitoring.session import session
-from avow.backends.rosmonitoring.told import readable
 from avow.backends.rosmonitoring.traces import read_trace
 from avow.base.diagnostics import Rejected
 from avow.system.plan import System

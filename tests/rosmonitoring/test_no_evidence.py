@@ -13,7 +13,7 @@ import pytest
 
 from avow.backend_kit.protocol import Limits
 from avow.backends.rosmonitoring import BACKEND, options
-from avow.backends.rosmonitoring.command import _Output, _told
+from avow.backends.rosmonitoring.command import _Output, _report
 from avow.backends.rosmonitoring.engine import Monitor
 from avow.backends.rosmonitoring.session import Session, session
 from avow.backends.rosmonitoring.watched import Fault
@@ -292,7 +292,7 @@ def test_a_topic_that_never_came_is_told_and_no_initial_value_advised(
     said = [{"topic": topic, "data": 0, "time": k / 10} for k, topic in enumerate([sent, "/v"] * 10)]
     trace.write_text("".join(f"{json.dumps(event)}\n" for event in said), encoding="utf-8")
     running = session(system, ("n",), trace)
-    assert _told(running, running.run(trace), str(trace), _Output(False, False, None, None)) == 1
+    assert _report(running, running.run(trace), str(trace), _Output(False, False, None, None)) == 1
     told = capsys.readouterr().out
     assert "initial" not in told
     assert "bears" not in told

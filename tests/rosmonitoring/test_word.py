@@ -20,7 +20,7 @@ from avow.backends.rosmonitoring import BACKEND, engine
 from avow.backends.rosmonitoring import word as words
 from avow.backends.rosmonitoring.command import command
 from avow.backends.rosmonitoring.engine import Monitor
-from avow.backends.rosmonitoring.judged import Judgement, Telling
+from avow.backends.rosmonitoring.judged import Judgement, ReportingMonitor
 from avow.backends.rosmonitoring.options import Setup
 from avow.backends.rosmonitoring.watched import Fault
 from avow.base.verdict import Verdict
@@ -73,9 +73,9 @@ def recorded(run: list[Step], rng: random.Random, numbered: bool = True) -> list
 def verdicts(known: Setup, term: Term, events: list[Event]) -> dict[int, bool]:
     """What is said of a guarantee at each step, by the numbers of the answers that are decided."""
     clause = Clause(ClauseKind.GUARANTEE, "g", 1, term)
-    monitor = Telling(replace(known, node=replace(known.node, guarantees=(clause,))))
+    monitor = ReportingMonitor(replace(known, node=replace(known.node, guarantees=(clause,))))
     told: list[Judgement] = []
-    monitor.tell = told.append
+    monitor.report = told.append
     broke = {v.index for event in events for v in monitor.step(event)} | {v.index for v in monitor.finish()}
     tally = monitor.tallies["g"]
     if monitor.backwards and not tally.decided:  # withdrawn
