@@ -10,11 +10,13 @@ from __future__ import annotations
 import json
 import sys
 from collections.abc import Sequence
+from dataclasses import field
 from pathlib import Path
 
 from avow.assurance.certification import KernelRun
 from avow.base.codec import Unreadable, from_text, to_json
 from avow.base.files import read_text, sha256
+from avow.base.records import dataclass
 from avow.base.tuning.effort import KERNEL_SECOND_ALL
 from avow.base.verdict import Verdict
 from avow.calculus.certificates import Certificates
@@ -27,13 +29,27 @@ from avow.evidence.record import Evidence
 from avow.kernel.certificate import Certificate
 from avow.kernel.solvers import Solvers
 from avow.pipeline.engine_code import trusted_parts
-from avow.pipeline.kernel_answers import Checked
 from avow.pipeline.run_info import Run
 from avow.pipeline.work import COMPOSE, texts_digest
-from avow.solving.apart import Both, versions
+from avow.solving.apart import Apart, Both, versions
 from avow.system.plan import System
 
 FILE = "certificates.json"
+
+
+@dataclass(slots=True)
+class Checked:
+    """What the kernel established in a run for one system as it is now (`Run.checked`).
+
+    `kernels`: one for each file of certificates, by its digest."""
+
+    texts: str
+    kernels: dict[str, Certificates] = field(default_factory=dict)
+    solvers: Solvers = field(default_factory=lambda: Solvers(z3=Apart("z3")))
+    answers: dict[tuple[str, str, str], Reestablished | None] = field(default_factory=dict)
+    runs: dict[str, KernelRun] = field(default_factory=dict)
+    counting: tuple[tuple[object, ...], tuple[Entry, ...]] | None = None
+    """A ledger's path, head and length, and its entries that count."""
 
 
 def written(certificates: Certificates) -> str:

@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING
 from avow.pipeline.settings import FRESH
 
 if TYPE_CHECKING:
-    from avow.pipeline.kernel_answers import Checked
     from avow.pipeline.processes import Processes
+    from avow.pipeline.recheck import Checked
     from avow.pipeline.remote import Remote
 
 

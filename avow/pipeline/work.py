@@ -95,7 +95,8 @@ def _language_work(system: System) -> Work:
         "",
         _contract_digest(contract),
     )
-    return _work(system, SYSTEM_LEVEL, LANGUAGE, (obligation,), engine_digest())
+    keys = _keys((obligation,), LANGUAGE, engine_digest())
+    return Work(system, SYSTEM_LEVEL, LANGUAGE, LANGUAGE, (obligation,), keys)
 
 
 def _sanity_work(whole: Frame, node: Node) -> Work:
@@ -144,9 +145,9 @@ def compose_work(composition: Composition) -> Work:
     system = composition.frame.system
     tasks = all_tasks(composition)
     obligations = tuple(task.obligation for task in tasks)
-    parts = (engine_identity(), _scenario(system))
     reasons = {task.obligation.id: task.because for task in tasks if task.because}
-    return _work(system, SYSTEM_LEVEL, COMPOSE, obligations, *parts, cut=lambda: compose_slice(system), reasons=reasons)
+    keys = _keys(obligations, COMPOSE, engine_identity(), _scenario(system), reasons=reasons)
+    return Work(system, SYSTEM_LEVEL, COMPOSE, COMPOSE, obligations, keys, cut=lambda: compose_slice(system))
 
 
 def _method_works(system: System, offered: Offered = None) -> tuple[Work, ...]:
@@ -179,19 +180,20 @@ def method_work(system: System, node: Node, method: Method, offered: Offered = N
         surroundings(tool, job, told, files),
         *_compared(system, job),
     )
-    work = _work(
+    return Work(
         system,
         node.name,
         method.id,
+        tool.name,
         job.every,
-        *parts,
-        engine=tool.name,
-        limits=_limits(method, options),
+        _keys(job.every, method.id, *parts),
+        _limits(method, options),
         cut=lambda: method_slice(tool, job, files),
         shown=lambda: method_slice(tool, job, files, sentences=True),
         files=files,
+        tools=tools,
+        planned=(tool, job),
     )
-    return replace(work, tools=tools, planned=(tool, job))
 
 
 def _compared(system: System, job: Job) -> tuple[str, ...]:
@@ -287,23 +289,6 @@ def catalogue(system: System, offered: Offered = None, shelf: Shelf | None = Non
     every |= {o.id: o for o in guarantees}
     every |= {o.id: o for work in works for o in work.obligations if o.kind is Kind.PROGRAM}
     return Catalogue(system, tuple(every.values()), works)
-
-
-def _work(
-    system: System,
-    node: str,
-    method: str,
-    obligations: tuple[Obligation, ...],
-    *parts: str,
-    engine: str | None = None,
-    limits: Limits | None = None,
-    cut: Callable[[], Slice] | None = None,
-    shown: Callable[[], Slice] | None = None,
-    files: tuple[Path, ...] = (),
-    reasons: Mapping[str, str] | None = None,
-) -> Work:
-    keys = _keys(obligations, method, *parts, reasons=reasons)
-    return Work(system, node, method, engine or method, obligations, keys, limits or Limits(), cut, shown, files)
 
 
 def _keys(
