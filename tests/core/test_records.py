@@ -12,8 +12,6 @@ import pytest
 
 from avow.base import records
 
-Kinds = tuple[type, ...]
-
 
 def _kinds(made: Callable[..., Any]) -> dict[str, Any]:
     @made(frozen=True, slots=True)

@@ -39,7 +39,6 @@ ONCE = (
     "a file of the package, a grammar, a library or a tool: read, loaded or asked when first needed, and the same after"
 )
 KEPT = "what was computed of the same arguments: faster, and never another answer"
-PATCHED = "another's module, in the process of a subject or for the time of a search"
 ELSEWHERE = {
     "avow/assurance/policy._data": ONCE,
     "avow/assurance/standards.standards": ONCE,

@@ -72,64 +72,6 @@ def test_grades_in_cached_runs(workspace: Path) -> None:
     assert edited.keys() == verify(workspace, "-a")[0].keys()
 
 
-def statuses(workspace: Path, *options: str) -> dict[str, str]:
-    """Every status of the report, after a run."""
-    command = [sys.executable, "-m", "doit", *options, "verify"]
-    subprocess.run(command, cwd=workspace, capture_output=True, text=True, timeout=300, check=False)
-    found: Any = json.loads((workspace / "reports/robot/report.json").read_text())
-    views = {json.dumps([o["obligation"][k] for k in ("node", "kind", "name")]): o for o in found["obligations"]}
-    told = {name: f"{view['status']} {view['standing']}" for name, view in views.items()}
-    return told | {f"requirement {r['id']}": f"{r['answer']} {r['failing']}" for r in found["requirements"]}
-
-
-ZERO = """
-node b { inputs() outputs( s : INTEGER ) topics()
-  guarantee zero ( out.s == 0 )
-  guarantee small ( out.s < 9 ) }
-node a { inputs( s : INTEGER, x0 : INTEGER ) outputs( x : INTEGER ) topics()
-  guarantee adds ( out.x == in.x0 + in.s ) }
-"""
-ZERO_PLAN = """
-connections: [{from: a.x, to: a.x0, delayed: true, initial: '0'}]
-requirements: {R: {text: it stays, formula: a.x == 0, supported_by: [a]}}
-nodes:
-  b: {methods: [{hypothesis: {subject: 'models/b.py:step', cases: 20}}]}
-  a: {methods: [{hypothesis: {subject: 'models/a.py:step', cases: 20}}]}
-accepted:
-  - obligation: b/guarantee/zero
-    verdict: refuted
-    reason: it is known
-    who: A. Person
-    date: 2026-11-01
-    expires: 2030-01-01
-"""
-NAMED = "compose: {D: {select: [a, b], rule: %s}}\n"
-
-
-@pytest.mark.nightly
-def test_ways_in_through_cached_runs(workspace: Path) -> None:
-    """What only the base case of an induction needs, refuted and accepted; a derivation that gets a name, another and
-    none; two guarantees that swap names: each in a run over the records of the one before, held against a fresh one."""
-    robot = workspace / "contracts/robot"
-    (robot / "models").mkdir(parents=True)
-    (robot / "models/b.py").write_text("def step():\n    return {'s': 5}\n")
-    (robot / "models/a.py").write_text("def step(s, x0):\n    return {'x': x0 + s}\n")
-    swapped = ZERO.replace("zero", "x").replace("small", "zero").replace("guarantee x", "guarantee small")
-    steps = (
-        (ZERO, ZERO_PLAN),
-        (ZERO, ZERO_PLAN + NAMED % "R1"),
-        (ZERO, ZERO_PLAN + (NAMED % "R4").replace("D:", "E:")),
-        (swapped, ZERO_PLAN + (NAMED % "R4").replace("D:", "E:")),
-        (ZERO, ZERO_PLAN),
-    )
-    for contract, plan in steps:
-        (robot / "system.rcl").write_text(contract)
-        (robot / "plan.yaml").write_text(plan)
-        cached = statuses(workspace)
-        assert "refuted" in cached["requirement R"], "b puts out 5, whoever accepts it"
-        assert cached == statuses(workspace, "-a")
-
-
 @pytest.mark.slow
 def test_a_loop_with_nothing_to_show(workspace: Path) -> None:
     """Nodes without assumptions in a loop: its rule is proved with no certificate, as it asks nothing."""
