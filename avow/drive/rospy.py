@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import functools
 import numbers
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
+
+from .callbacks import RESPONSE, Driven, answers
+from .refusals import Log, Strict
 
 SECOND = 10**9
 LOGS = ("logdebug", "loginfo", "logwarn", "logerr", "logfatal")
 
 
-def modules(base: Any, spec: Any, values: Any) -> Callable[[Any, Any], Callable[[str], str]]:
-    """Install the modules; the driver of a class. `base` is the module `callbacks`."""
-    driven = _world(base, spec)
+def modules(spec: Any, own: Sequence[str]) -> Callable[[Any, Any], Callable[[str], str]]:
+    """Install the modules; the driver of a class, whose own modules are in the folders `own`."""
+    driven = _World(spec, own)
     driven.time, driven.duration = time, duration = _times(driven, _moment(driven))
     find = _parameters(driven)
 
@@ -27,8 +30,8 @@ def modules(base: Any, spec: Any, values: Any) -> Callable[[Any, Any], Callable[
         pass
 
     every = [f"{name}{kind}" for name in LOGS for kind in ("", "_once", "_throttle", "_throttle_identical")]
-    content: dict[str, Any] = dict.fromkeys(every, base.Log.nothing)
-    content |= {cls.__name__: cls for cls in (*_endpoints(base, driven), time, duration, ROSException)}
+    content: dict[str, Any] = dict.fromkeys(every, Log.nothing)
+    content |= {cls.__name__: cls for cls in (*_endpoints(driven), time, duration, ROSException)}
     content["ROSInterruptException"] = ROSInterruptException
     content |= {
         "get_param": _getter(find),
@@ -40,7 +43,7 @@ def modules(base: Any, spec: Any, values: Any) -> Callable[[Any, Any], Callable[
         "get_namespace": lambda: driven.name.rpartition("/")[0] + "/",
         "resolve_name": driven.whole,
         "is_shutdown": lambda: False,
-        "on_shutdown": base.Log.nothing,
+        "on_shutdown": Log.nothing,
     }
     driven.install()
     driven.module("rospy", content)
@@ -48,23 +51,23 @@ def modules(base: Any, spec: Any, values: Any) -> Callable[[Any, Any], Callable[
     def make(made: Any, params: Any) -> Any:
         return made(params) if _takes(made) else made()
 
-    return base.answers(driven, values, make)  # type: ignore[no-any-return]
+    return answers(driven, make)
 
 
 _NONE = object()
 
 
-def _world(base: Any, spec: Any) -> Any:
-    class World(base.Driven):  # type: ignore[misc]
-        def moment(self, wire: str, nanoseconds: int) -> Any:
-            return (self.time if wire == "time" else self.duration).of(nanoseconds)
+class _World(Driven):
+    time: Any
+    duration: Any
 
-        def nanoseconds(self, wire: str, value: Any) -> int:
-            if type(value) is not (self.time if wire == "time" else self.duration):
-                raise TypeError(f"{value!r} is no {wire}")
-            return int(value.ns)
+    def moment(self, wire: str, nanoseconds: int) -> Any:
+        return (self.time if wire == "time" else self.duration).of(nanoseconds)
 
-    return World(spec)
+    def nanoseconds(self, wire: str, value: Any) -> int:
+        if type(value) is not (self.time if wire == "time" else self.duration):
+            raise TypeError(f"{value!r} is no {wire}")
+        return int(value.ns)
 
 
 def _moment(driven: Any) -> Any:
@@ -209,9 +212,9 @@ def _times(driven: Any, moment: Any) -> tuple[Any, Any]:
     return Time, Duration
 
 
-def _endpoints(base: Any, driven: Any) -> tuple[Any, Any, Any]:
-    class Subscriber(base.Strict):  # type: ignore[misc]
-        _driven, _called = driven, "rospy.Subscriber"
+def _endpoints(driven: Any) -> tuple[Any, ...]:
+    class Subscriber(Strict):
+        _called = "rospy.Subscriber"
 
         def __init__(
             self,
@@ -226,8 +229,8 @@ def _endpoints(base: Any, driven: Any) -> tuple[Any, Any, Any]:
             extra = () if callback_args is None else (callback_args,)
             driven.hear(name, data_class, lambda message: callback(message, *extra) if callback else None)
 
-    class Publisher(base.Strict):  # type: ignore[misc]
-        _driven, _called = driven, "rospy.Publisher"
+    class Publisher(Strict):
+        _called = "rospy.Publisher"
 
         def __init__(
             self, name: str, data_class: Any, latch: bool = False, queue_size: Any = None, tcp_nodelay: bool = False
@@ -238,14 +241,35 @@ def _endpoints(base: Any, driven: Any) -> tuple[Any, Any, Any]:
             whole = len(given) == 1 and not named and type(given[0]) is self.kind
             driven.say(self.topic, given[0] if whole else self.kind(*given, **named))
 
+    class Service(Strict):
+        _called = "rospy.Service"
+
+        def __init__(
+            self, name: str, service_class: Any, handler: Any, buff_size: int = 65536, error_handler: Any = None
+        ) -> None:
+            response = driven.classes.get(f"{driven.services.get(service_class)}{RESPONSE}")
+
+            def act(request: Any) -> Any:
+                """What a handler may return: a response, or the values of its fields."""
+                returned = handler(request)
+                if type(returned) is response:
+                    return returned
+                if isinstance(returned, dict):
+                    return response(**returned)
+                if returned is None:
+                    raise TypeError("the handler of a service returned None")
+                return response(*(returned if isinstance(returned, list | tuple) else (returned,)))
+
+            self.resolved_name = driven.serve(name, service_class, act)
+
     class TimerEvent:
         def __init__(self, before: Any, now: Any) -> None:
             self.last_expected = self.last_real = before
             self.current_expected = self.current_real = now
             self.last_duration = 0.0
 
-    class Timer(base.Strict):  # type: ignore[misc]
-        _driven, _called = driven, "rospy.Timer"
+    class Timer(Strict):
+        _called = "rospy.Timer"
 
         def __init__(self, period: Any, callback: Any, oneshot: bool = False, reset: bool = False) -> None:
             if type(period) is not driven.duration or period.ns <= 0:
@@ -265,7 +289,7 @@ def _endpoints(base: Any, driven: Any) -> tuple[Any, Any, Any]:
         def shutdown(self) -> None:
             self.over = True
 
-    return Subscriber, Publisher, Timer
+    return Subscriber, Publisher, Timer, Service
 
 
 def _parameters(driven: Any) -> Callable[[str], Any]:

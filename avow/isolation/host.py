@@ -119,29 +119,32 @@ def _ratio(numerator: int, denominator: int) -> dict[str, Any]:
     return {"q": [str(numerator), str(denominator)]}
 
 
-def load(path: str, function: str, drive: Any = None) -> Any:
-    """The function of the file; with `drive`, which `driving` gives, the class that the JSON in `function` names."""
-    spec = importlib.util.spec_from_loader("avow_subject", _FromSource("avow_subject", path))
+def load(path: str, name: str, function: str, drive: Any = None) -> Any:
+    """The function of the file, which is the module of that name; with `drive`, which `driving` gives, the class that
+    the JSON in `function` names."""
+    if package := name.rpartition(".")[0]:
+        importlib.import_module(package)
+    spec = importlib.util.spec_from_loader(name, _FromSource(name, path))
     if spec is None or spec.loader is None:
         raise ImportError(f"{path} is no Python module")
     spec.origin, spec.has_location = path, True
     module = importlib.util.module_from_spec(spec)
-    sys.modules["avow_subject"] = module
-    sys.path.insert(0, os.path.dirname(path))  # noqa: PTH120 - its neighbours, as if it were run
+    sys.modules[name] = module
     try:
         spec.loader.exec_module(module)
     except ModuleNotFoundError as error:
         near = _near(str(error.name), {name.partition(".")[0] for name in sys.modules})
-        error.msg += near or f": install it where Avow runs, or put its file beside {os.path.basename(path)}"  # noqa: PTH119
+        near = near or f": install it where Avow runs, or put its file beside {os.path.basename(path)}"  # noqa: PTH119
+        error.msg += near if error.msg.startswith("No module") else ""
         raise
     driven = json.loads(function) if drive is not None else None
-    name = function if driven is None else driven["class"]
+    wanted = function if driven is None else driven["class"]
     try:
-        found = getattr(module, name)
+        found = getattr(module, wanted)
     except AttributeError:
         kind = "function" if driven is None else "class"
-        near = _near(name, {each for each in vars(module) if not each.startswith("_")})
-        raise AttributeError(f"{os.path.basename(path)} has no {kind} {name!r}{near}") from None  # noqa: PTH119
+        near = _near(wanted, {each for each in vars(module) if not each.startswith("_")})
+        raise AttributeError(f"{os.path.basename(path)} has no {kind} {wanted!r}{near}") from None  # noqa: PTH119
     return found if driven is None else drive(found, driven)
 
 
@@ -153,16 +156,37 @@ def _near(name: str, known: set[str]) -> str:
     return f": did you mean {near[0]}?" if near else ""
 
 
-def driving(function: str) -> Any:
-    """The driver of the class that the JSON in `function` names; None for a function. The substitute for ROS is in
-    place before the file is loaded."""
+def places(path: str, root: str) -> tuple[str, list[str], list[tuple[str, str]]]:
+    """The name of the file's module; the folders of its imports: its own, as if it were run, and those of the ament or
+    catkin package that it is in; what decided it."""
+    looked: list[tuple[str, str]] = []
+
+    def has(folder: str, file: str) -> bool:
+        looked.append(("kind", os.path.join(folder, file)))  # noqa: PTH118
+        return os.path.isfile(looked[-1][1])  # noqa: PTH113
+
+    folder, stem = os.path.split(path)
+    folders, names = [folder], [os.path.splitext(stem)[0]]  # noqa: PTH122
+    while folder.startswith(root + os.sep) and has(folder, "__init__.py"):
+        folder, name = os.path.split(folder)
+        names.insert(0, name)
+    folders.append(folder)
+    while not has(folder, "package.xml") and folder.startswith(root + os.sep):
+        folder = os.path.dirname(folder)  # noqa: PTH120
+    if os.path.isfile(looked[-1][1]):  # noqa: PTH113
+        folders += [folder, os.path.join(folder, "src")]  # noqa: PTH118
+    return ".".join(names) if len(names) > 1 else "avow_subject", list(dict.fromkeys(folders)), looked
+
+
+def driving(function: str, folders: list[str]) -> Any:
+    """The driver of the class that the JSON in `function` names, whose own modules are in the folders; None for a
+    function. The substitute for ROS is in place before the file is loaded."""
     if not function.startswith("{"):
         return None
-    steps = _beside("../drive/steps.py")
     ros = json.loads(function).get("ros")
-    if ros is None:
-        return steps.driver
-    return _beside(f"../drive/{ros['kind']}.py").modules(_beside("../drive/callbacks.py"), ros, steps)
+    _beside("../drive/__init__.py", "avow_drive")
+    driver = importlib.import_module("avow_drive.steps" if ros is None else f"avow_drive.{ros['kind']}")
+    return driver.driver if ros is None else driver.modules(ros, folders)
 
 
 class _FromSource(importlib.machinery.SourceFileLoader):
@@ -204,14 +228,14 @@ def _folders_only() -> list[tuple[str, str]]:
     return [("list", folder) for module in found for folder in getattr(module, "__path__", ())]
 
 
-def _beside(file: str) -> Any:
-    """Loads a module from this folder, outside of any package."""
-    place = os.path.join(os.path.dirname(__file__), file)  # noqa: PTH118, PTH120
-    name = "avow_" + os.path.basename(file).partition(".")[0]  # noqa: PTH119
-    loader = importlib.machinery.SourceFileLoader(name, place)
-    spec = importlib.util.spec_from_loader(name, loader)
-    module = importlib.util.module_from_spec(spec)  # type: ignore[arg-type]
-    loader.exec_module(module)
+def _beside(file: str, name: str) -> Any:
+    """Loads a module or a package from this folder under a name of its own, outside of Avow's package."""
+    place = os.path.normpath(os.path.join(os.path.dirname(__file__), file))  # noqa: PTH118, PTH120
+    spec = importlib.util.spec_from_file_location(name, place)
+    assert spec is not None
+    assert spec.loader is not None
+    sys.modules[name] = module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
     return module
 
 
@@ -254,17 +278,19 @@ def main() -> None:
     sys.argv[:], sys.orig_argv[:] = [path], [sys.executable, path]  # the same at every run
     with os.fdopen(source, "r", encoding="utf-8") as requests, os.fdopen(sink, "w", encoding="utf-8") as answers:
         random.seed(0)
-        drive = driving(function)
+        name, folders, looked = places(path, os.path.realpath(root))
+        drive = driving(function, folders)
         _read_sources_only(os.path.realpath(root))
-        seen = _beside("watching.py").watch(tempfile.gettempdir())
-        before = _found_before()
+        seen = _beside("watching.py", "avow_watching").watch(tempfile.gettempdir())
+        before = [*_found_before(), *looked]
+        sys.path[:0] = folders
 
         def say(message: dict[str, Any], earlier: list[tuple[str, str]] = before[:0]) -> None:
             answers.write(json.dumps({**message, "seen": [*earlier, *seen()]}) + "\n")
             answers.flush()
 
         try:
-            subject = load(path, function, drive)
+            subject = load(path, name, function, drive)
             known = accepted(subject)
         except BaseException as error:
             say({"error": _told(error)}, before)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from avow.base.files import read_text
 from avow.base.records import dataclass
-from avow.ros.calls import Calls, as_message, parts_of, with_parts
+from avow.ros.calls import CALL, Calls, as_message, parts_of, with_parts
 from avow.ros.definitions import Definitions, Message, canonical
 from avow.ros.sources import DISTRIBUTIONS, from_store, message_files
 
@@ -84,7 +84,7 @@ def fields_of(event: Event) -> dict[str, Any]:
     whole = event.get(WHOLE)
     if isinstance(whole, Mapping):
         return {**whole}
-    return {name: value for name, value in event.items() if name not in (*ENVELOPE, PUBLISHER, LIVE)}
+    return {name: value for name, value in event.items() if name not in (*ENVELOPE, PUBLISHER, LIVE, CALL)}
 
 
 def publisher(event: Event) -> str:

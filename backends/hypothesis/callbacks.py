@@ -295,6 +295,7 @@ class _Work:
         """The limits of the answer."""
         found: dict[str, object] = {"cases": self.messages, "runs": self.runs, "rejected": self.rejected}
         found |= {"replayed": self.replayed} if self.replayed else {}
+        found |= {"begins": self.driver.topics.state} if self.driver.topics.state else {}
         return found | {"seed": self.limits.seed}
 
     def settled(self, obligation: Obligation, stopped: str, unsteady: str, wrong: Sequence[Counterexample]) -> Outcome:

@@ -92,7 +92,8 @@ def command(
     else:
         stamps = [f"{topic}: {n} differ only in header.stamp, the clock's time" for topic, n in stamped.items()]
         same = ("the recording has the same",) if replay and not raised and not different else ()
-        click.echo(f"{node}: {len(events)} messages heard, {len(run.said)} published")
+        begins = f", begins {run.state}" if run.state else ""
+        click.echo(f"{node}: {len(events)} messages heard, {len(run.said)} published{begins}")
         for text in (*raised, *different, *stamps, *same):
             click.echo(text)
     return 1 if raised or different else 0

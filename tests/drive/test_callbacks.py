@@ -304,13 +304,13 @@ def test_nodes_of_ros_2_have_what_they_have(tmp_path: Path) -> None:
 
 UNSUPPORTED = {  # what of rclpy is used, and what is told besides its name and line
     "self.create_client(None, 'x')": "rclpy.node.Node.create_client",
-    "self.add_on_set_parameters_callback(print)": "add_on_set_parameters_callback (watch.py, line {}); instead: read",
+    "self.add_pre_set_parameters_callback(print)": "Node.add_pre_set_parameters_callback (watch.py, line {})",
     "self.create_timer(1.0, print, clock=self.get_clock())": "create_timer(clock=) (watch.py, line {}); instead: ",
     "self.create_timer(1.0, print, autostart=False)": "create_timer(autostart=) (watch.py, line {})",
     "import rclpy.callback_groups as g; g.ReentrantCallbackGroup()": "CallbackGroup (watch.py, line {}); instead: Mut",
     "Node('other', allow_undeclared_parameters=True)": "parameters=) (watch.py, line {}); instead: declare_parameter",
     "self.create_subscription(String, 's', print, 1, raw=True)": "create_subscription(raw=) (watch.py, line {})",
-    "import nav_msgs.msg as _": "the module nav_msgs (watch.py, line {})",
+    "import nav_msgs.msg as _": "the module nav_msgs (watch.py, line {}); instead: its definitions",
 }
 
 

@@ -8,7 +8,7 @@ import random
 import struct
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +24,7 @@ from avow.language.contract import Node, Topic
 from avow.language.sorts import DataSort, EnumSort
 from avow.language.terms import Role
 from avow.ros.bags import fields_of
+from avow.ros.calls import CALL, is_part
 from avow.ros.definitions import HEADER, INTEGERS, Array, Definitions, Field, Message, Nested, Scalar, Wire, canonical
 from avow.ros.sources import definitions, require
 from avow.system.node_plan import parameters
@@ -49,7 +50,7 @@ class Event:
     at: int
     data: Any
     after: int = 0
-    """For a publication: how many messages had been delivered before it."""
+    """How many messages had been delivered: for a message with itself, in `Run.beside`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,6 +64,8 @@ class Run:
     wrong: str = ""
     after: int = 0
     on: str = ""
+    state: str = ""
+    """Of a lifecycle node, before its first message."""
 
     @property
     def raised(self) -> tuple[str, ...]:
@@ -73,7 +76,7 @@ class Run:
     def beside(self, heard: Sequence[Event]) -> Iterator[Event]:
         """Messages received and published, in order of occurrence."""
         for number in range(len(heard) + 1):
-            yield from heard[number - 1 : number] if number else ()
+            yield from (replace(event, after=number) for event in heard[number - 1 : number] if number)
             yield from (event for event in self.said if event.after == number)
 
 
@@ -92,6 +95,8 @@ class Driver:
     known: Definitions
     topics: Run
     """Its subscriptions and publications before the first message."""
+    text: str
+    """Its code and that of the modules that it imports from the system's folder, for their constants only."""
 
     @property
     def carried(self) -> frozenset[str]:
@@ -146,9 +151,10 @@ class Driver:
             raise unusable(f"{where}: {topic} carries {kind}: {error}") from None
 
     def fields(self, event: Event) -> dict[str, Any]:
-        """A message's fields as a recording has them."""
+        """A message's fields as a recording has them. A service answers a request before the next message."""
         kind = self.topics.heard.get(event.topic) or self.topics.spoken[event.topic]
-        return shown(Nested(kind), event.data, self.known, self.source.kind)  # type: ignore[no-any-return]
+        found: dict[str, Any] = shown(Nested(kind), event.data, self.known, self.source.kind)
+        return found | ({CALL: str(event.after)} if is_part(event.topic) else {})
 
     def generated(self, messages: int, seed: int | str) -> Iterator[Event]:
         """So many messages on its subscriptions, made from the numbers and words of contract, program and
@@ -177,11 +183,6 @@ class Driver:
     def params(self) -> Mapping[str, Any]:
         return self.subject.params
 
-    @property
-    def text(self) -> str:
-        """The program's code, for its constants only."""
-        return read_text(self.subject.file, "utf-8", errors="replace")
-
 
 def driver(system: System, name: str) -> Driver:
     """The class that the plan declares as the node. Raises Rejected."""
@@ -209,16 +210,20 @@ def driver(system: System, name: str) -> Driver:
     if known.get(HEADER) is None:
         header = _ROS1_HEADER if source.kind is Driving.ROSPY else _HEADER
         known = Definitions({**known.messages, HEADER: header})
+    folders = [folder for folder in path.parents if folder.is_relative_to(root)]
+    package = next((folder for folder in folders if (folder / "package.xml").is_file()), path.parent)
     ros = {
         "kind": source.kind.value,
         "name": placed.name,
         "remaps": [list(pair) for pair in placed.remaps],
         "most": DRIVEN_CALLBACKS,
-        "messages": _messages(node, path, known, source.kind, plan.ros.distro),
+        "messages": _messages(node, package, known, source.kind, plan.ros.distro),
     }
     subject = Subject(root, path, source.class_name, params, {}, (), ros)
-    ((topics,), _) = _runs(source, subject, [((), 0, 0)], quiet=True)
-    found = Driver(system, node, source, subject, known, topics)
+    ((topics,), how) = _runs(source, subject, [((), 0, 0)], quiet=True)
+    read = {path, *(Path(seen.path) for seen in how.observed if seen.kind is Seen.READ and seen.path.endswith(".py"))}
+    text = "".join(read_text(file, "utf-8", errors="replace") for file in sorted(read) if file.is_relative_to(root))
+    found = Driver(system, node, source, subject, known, topics, text)
     if found.topics.wrong:
         raise _refused(source, f"{source.class_name} is not made: {found.topics.wrong}")
     if wrong := tuple(found.fits()):
@@ -254,7 +259,7 @@ def _runs(
 
 def _made(reply: Mapping[str, Any]) -> Run:
     said = tuple(Event(topic, at, data, after) for topic, at, data, after in reply["said"])
-    return Run(said, reply["heard"], reply["spoken"], reply["wrong"], reply["after"], reply["on"])
+    return Run(said, reply["heard"], reply["spoken"], *(reply[name] for name in ("wrong", "after", "on", "state")))
 
 
 class Silent(Rejected):
@@ -277,10 +282,11 @@ def unusable(text: str) -> Rejected:
 # -- messages ------------------------------------------------------------------------------------------------
 
 
-def _messages(node: Node, file: Path, known: Definitions, kind: Driving, distro: str | None) -> dict[str, Any]:
-    """The message types of the contract's topics and of the packages that the source's folder names, with their
-    fields."""
-    text = "".join(read_text(path, "utf-8", errors="replace") for path in sorted(file.parent.glob("*.py")))
+def _messages(node: Node, package: Path, known: Definitions, kind: Driving, distro: str | None) -> dict[str, Any]:
+    """The message types of the contract's topics and of the packages that the files of the node's package (or the
+    source's folder) name, with their fields."""
+    files = sorted(found for depth in ("*.py", "*/*.py", "*/*/*.py") for found in package.glob(depth))
+    text = "".join(read_text(path, "utf-8", errors="replace") for path in files)
     wanted = [canonical(topic.ros_type) for topic in node.topics]
     wanted += [name for name in known.messages if name.partition("/")[0] in text]
     found: dict[str, Any] = {}

@@ -1,0 +1,313 @@
+"""Nodes as teams write them: each is driven as it is, keeps its guarantees, and its mutants do not."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from importlib import import_module
+from pathlib import Path
+
+import pytest
+from helpers import avow, edit
+
+from avow.backend_kit import one_step
+from avow.backend_kit.protocol import Limits
+from avow.base.verdict import Outcome, Verdict
+from avow.pipeline.methods import method_job
+from avow.system.load import load_system
+from drive.test_callbacks import drive
+
+TOOL = import_module("avow.backends.hypothesis").BACKEND
+
+
+@dataclass(frozen=True, slots=True)
+class Made:
+    """A node's contract, its files (the first is its own), mutants of them (old and new text), and its plan."""
+
+    contract: str
+    files: Mapping[str, str]
+    mutants: tuple[tuple[str, str], ...]
+    options: str = ""
+    params: str = ""
+    mapping: str = "{}"
+    kind: str = "rclpy"
+
+
+def system(folder: Path, made: Made) -> Path:
+    for path, text in {**made.files, "params.yaml": made.params or "{}\n", "system.rcl": made.contract}.items():
+        (folder / path).parent.mkdir(parents=True, exist_ok=True)
+        (folder / path).write_text(text, encoding="utf-8")
+    (folder / "plan.yaml").write_text(
+        "system: w\ncontract: system.rcl\nros: {distro: humble}\nnodes:\n  watch:\n"
+        f"    source: {{python: {next(iter(made.files))}, class: Watch, kind: {made.kind}, parameters: params.yaml}}\n"
+        f"    mapping: {made.mapping}\n    methods: [hypothesis: {{cases: 300}}]\n{made.options}",
+        encoding="utf-8",
+    )
+    return folder
+
+
+def verdicts(folder: Path) -> dict[str, Outcome]:
+    loaded = load_system(folder)
+    job = method_job(loaded, loaded.contract.node("watch"), loaded.plan.node("watch").methods[0])
+    assert not [d for d in one_step.check(TOOL, job) if d.is_error]
+    return {o.obligation.rpartition("/")[2]: o for o in one_step.discharge(TOOL, job, job.root, Limits()).outcomes}
+
+
+LIMIT = """\
+node watch {
+  inputs( asked : REAL )
+  outputs( allowed : REAL )
+  topics( float64 asked matches(in.asked), float64 allowed matches(out.allowed) )
+  guarantee limited ( out.allowed <= 1.5 )
+  guarantee followed ( in.asked <= 1.5 -> out.allowed == in.asked )
+}
+"""
+PACKAGE = {
+    "ws/src/mover/mover/node.py": """\
+from mover.limits import clamp
+from rclpy.node import Node
+from std_msgs.msg import Float64
+
+from .names import ALLOWED
+
+
+class Watch(Node):
+    def __init__(self):
+        super().__init__("watch")
+        self.allowed = self.create_publisher(Float64, ALLOWED, 10)
+        self.create_subscription(Float64, "asked", self.heard, 10)
+
+    def heard(self, message):
+        self.allowed.publish(Float64(data=clamp(message.data)))
+""",
+    "ws/src/mover/mover/__init__.py": "",
+    "ws/src/mover/mover/names.py": 'ALLOWED = "allowed"\n',
+    "ws/src/mover/mover/limits.py": "FASTEST = 1.5\n\n\ndef clamp(speed):\n    return min(FASTEST, speed)\n",
+    "ws/src/mover/package.xml": "<package><name>mover</name></package>\n",
+}
+CATKIN = {
+    "mover/scripts/node.py": """\
+import rospy
+from mover.limits import clamp
+from mover.msg import Speed
+from std_msgs.msg import Float64
+
+
+class Watch:
+    def __init__(self):
+        self.allowed = rospy.Publisher("allowed", Speed, queue_size=1)
+        rospy.Subscriber("asked", Float64, self.heard)
+
+    def heard(self, message):
+        self.allowed.publish(clamp(message.data))
+""",
+    "mover/src/mover/__init__.py": "",
+    "mover/src/mover/limits.py": PACKAGE["ws/src/mover/mover/limits.py"],
+    "mover/package.xml": PACKAGE["ws/src/mover/package.xml"],
+    "mover/msg/Speed.msg": "float64 speed\n",
+}
+STOP = """\
+node watch {
+  inputs( hold : BOOL, speed : REAL )
+  outputs( held : BOOL, motor : REAL )
+  topics( std_srvs/SetBool_Request stop matches(in.hold), std_srvs/SetBool_Response stop matches(out.held),
+          float64 speed matches(in.speed), float64 motor matches(out.motor) )
+  guarantee obeyed ( out.held <=> in.hold )
+  guarantee still ( in.hold -> out.motor == 0 )
+}
+"""
+SERVER = """\
+from rclpy.node import Node
+from rclpy.executors import ExternalShutdownException, MultiThreadedExecutor
+from std_msgs.msg import Float64
+from std_srvs.srv import SetBool
+
+
+class Watch(Node):
+    def __init__(self):
+        super().__init__("watch")
+        self.held = False
+        self.motor = self.create_publisher(Float64, "motor", 10)
+        self.create_service(SetBool, "stop", self.stop)
+        self.create_subscription(Float64, "speed", self.move, 10)
+
+    def stop(self, request, response):
+        self.held = request.data
+        self.motor.publish(Float64(data=0.0))
+        response.success = self.held
+        response.message = "held" if self.held else "free"
+        return response
+
+    def move(self, message):
+        self.motor.publish(Float64(data=0.0 if self.held else message.data))
+"""
+SERVER1 = """\
+import rospy
+from std_msgs.msg import Float64
+from std_srvs.srv import SetBool, SetBoolRequest, SetBoolResponse
+
+
+class Watch:
+    def __init__(self):
+        self.held = False
+        self.motor = rospy.Publisher("motor", Float64, queue_size=10)
+        rospy.Service("stop", SetBool, self.stop)
+        rospy.Subscriber("speed", Float64, self.move)
+
+    def stop(self, request):
+        assert isinstance(request, SetBoolRequest)
+        self.held = request.data
+        self.motor.publish(0.0)
+        return SetBoolResponse(success=True, message="held") if self.held else (False, "free")
+
+    def move(self, message):
+        self.motor.publish(0.0 if self.held else message.data)
+"""
+TUNED = """\
+from rcl_interfaces.msg import FloatingPointRange, ParameterDescriptor, SetParametersResult
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from std_msgs.msg import Float64
+
+
+class Watch(Node):
+    def __init__(self):
+        super().__init__("watch")
+        self.fastest = 9.0
+        self.add_on_set_parameters_callback(self.tuned)
+        span = FloatingPointRange(from_value=0.0, to_value=10.0)
+        self.declare_parameter("fastest", 1.0, ParameterDescriptor(floating_point_range=[span]))
+        self.allowed = self.create_publisher(Float64, "allowed", 10)
+        self.create_subscription(Float64, "asked", self.heard, 10)
+
+    def tuned(self, parameters):
+        for parameter in parameters:
+            if parameter.name == "fastest":
+                if parameter.value > 1.5:
+                    return SetParametersResult(successful=False, reason="too fast")
+                self.fastest = parameter.value
+        return SetParametersResult(successful=True)
+
+    def heard(self, message):
+        for fastest in (2.0, 20.0, 1.5):
+            self.set_parameters([Parameter("fastest", Parameter.Type.DOUBLE, fastest)])
+            assert self.fastest <= 1.5
+        self.allowed.publish(Float64(data=min(message.data, self.get_parameter("fastest").value)))
+"""
+CAMERA = """\
+from rclpy.lifecycle import LifecycleNode, State, TransitionCallbackReturn
+from std_msgs.msg import Float64
+
+
+class Watch(LifecycleNode):
+    def __init__(self):
+        super().__init__("watch")
+        self.declare_parameter("fastest", 9.0)
+        self.fastest = None
+
+    def on_configure(self, state: State) -> TransitionCallbackReturn:
+        assert state.label == "unconfigured"
+        self.fastest = self.get_parameter("fastest").value
+        self.allowed = self.create_lifecycle_publisher(Float64, "allowed", 10)
+        self.create_subscription(Float64, "asked", self.heard, 10)
+        return TransitionCallbackReturn.SUCCESS
+
+    def on_activate(self, state: State) -> TransitionCallbackReturn:
+        self.allowed.publish(Float64(data=99.0))  # not yet active
+        return super().on_activate(state)
+
+    def heard(self, message):
+        self.allowed.publish(Float64(data=min(message.data, self.fastest)))
+"""
+NODES = {
+    "an ament package": Made(LIMIT, PACKAGE, (("min(FASTEST", "max(FASTEST"), ("FASTEST = 1.5", "FASTEST = 1.75"))),
+    "a catkin package with messages": Made(
+        LIMIT.replace("float64 allowed", "mover/Speed allowed"),
+        CATKIN,
+        (("FASTEST = 1.5", "FASTEST = 1.0"),),
+        kind="rospy",
+        options="messages: [mover/msg]\n",
+    ),
+    "a service": Made(
+        STOP,
+        {"src/stop.py": SERVER},
+        (("= self.held\n", "= True\n"), ("0.0 if self.held else", "")),
+        mapping="{out.held: success}",
+    ),
+    "a service of ROS 1": Made(
+        STOP,
+        {"src/stop.py": SERVER1},
+        (("success=True", "success=False"),),
+        mapping="{out.held: success}",
+        kind="rospy",
+    ),
+    "callbacks of parameters": Made(
+        LIMIT, {"src/tuned.py": TUNED}, (("value > 1.5", "value > 2.5"), ("to_value=10.0", "to_value=0.5"))
+    ),
+    "a lifecycle node": Made(
+        LIMIT,
+        {"src/camera.py": CAMERA},
+        (('"fastest").value', '"fastest").value + 1'), ("super().on_activate(state)", "super().on_configure(state)")),
+        params="fastest: 1.5\n",
+    ),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", NODES)
+def test_a_node_is_driven_and_its_mutants_are_caught(tmp_path: Path, name: str) -> None:
+    made = NODES[name]
+    found = verdicts(system(tmp_path / "right", made))
+    assert {o.verdict for o in found.values()} == {Verdict.TESTED}, found
+    assert {o.bound.get("begins") for o in found.values()} == {"active" if name == "a lifecycle node" else None}
+    for number, (old, new) in enumerate(made.mutants):
+        files = {path: text.replace(old, new) for path, text in made.files.items()}
+        assert files != made.files, old
+        wrong = verdicts(system(tmp_path / str(number), replace(made, files=files)))
+        assert {o.verdict for o in wrong.values()} != {Verdict.TESTED}, (old, new)
+
+
+@pytest.mark.slow
+def test_an_edit_of_a_module_that_a_node_imports_makes_its_evidence_stale(tmp_path: Path) -> None:
+    made = NODES["an ament package"]
+    folder = system(tmp_path / "contracts/w", made)
+    (tmp_path / "dodo.py").touch()
+
+    def verdict() -> str:
+        done = avow("verify", cwd=tmp_path)
+        assert done.returncode in (0, 1), done.stderr
+        case = json.loads((tmp_path / "reports/w/report.json").read_text(encoding="utf-8"))
+        (found,) = (o["status"] for o in case["obligations"] if o["obligation"]["name"] == "limited")
+        return str(found)
+
+    assert verdict() == "tested"
+    edit(folder / "ws/src/mover/mover/limits.py", ("FASTEST = 1.5", "FASTEST = 1.75"))
+    assert verdict() == "refuted"
+
+
+REFUSED = {  # what is written in the place of a text of a node, and what is told
+    "a coroutine": ("a service", "def move", "async def move", "a callback that is a coroutine; instead: a callback"),
+    "groups in parallel": (
+        *("a service", '"stop", self.stop)', '"stop", self.stop, callback_group=Group())'),
+        "several callback groups, and MultiThreadedExecutor; instead: one callback group",
+    ),
+    "another service": ("a service", "SetBool", "Trigger", "subscribes to /stop/_request as std_srvs/Trigger_Request"),
+    "no response": ("a service", "return response", "return None", "TypeError: /stop/_response: None is no std_srvs"),
+    "not active": (
+        *("a lifecycle node", "return super().on_activate(state)", "return TransitionCallbackReturn.FAILURE"),
+        "RuntimeError: on_activate returned FAILURE: the node is inactive",
+    ),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", REFUSED)
+def test_what_a_node_may_not_do_is_told(tmp_path: Path, name: str) -> None:
+    node, old, new, why = REFUSED[name]
+    files = {path: text.replace(old, new) for path, text in NODES[node].files.items()}
+    first = "from rclpy.callback_groups import MutuallyExclusiveCallbackGroup as Group\n"
+    made = replace(NODES[node], files={path: first + text for path, text in files.items()})
+    done = drive(system(tmp_path / "w", made), "watch")
+    told = " ".join(d.message for d in done.exception.diagnostics) if done.exception else done.output
+    assert why in told
