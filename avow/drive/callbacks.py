@@ -23,7 +23,7 @@ from .steps import plain
 
 REQUEST, RESPONSE = "_Request", "_Response"
 """The ends of the names of a service's two message types."""
-STATE = ("said", "heard", "spoken", "due", "groups")
+STATE = ("said", "heard", "spoken", "due", "groups", "together")
 """The attributes that loading the file may change, and each run changes."""
 
 
@@ -44,6 +44,8 @@ class Driven(Refusals, Messages):
         self.due: list[tuple[int, int, Callable[[], Any]]] = []
         self.groups: set[Any] = set()
         """Callback groups of callbacks (None: a node's own)."""
+        self.together: list[list[str]] = []
+        """Topics whose messages belong together by their stamps."""
         self.services: dict[Any, str] = {}
         """Class of a service → its type (``package/Type``)."""
         self.most: int = spec["most"]
@@ -203,6 +205,7 @@ def answers(driven: Driven, make: Callable[[Any, Any], Any]) -> Callable[[Any, A
                     "after": driven.handled,
                     "on": on,
                     "state": state,
+                    "together": driven.together,
                 }
             )
 

@@ -11,7 +11,7 @@ from collections import UserList, UserString
 from collections.abc import Callable, Sequence, Set
 from typing import Any
 
-from . import lifecycle, parameters
+from . import filters, lifecycle, parameters
 from .callbacks import Driven, answers
 from .messages import INTEGERS
 from .nodes import ENTITIES, LOGS, Duration, MutuallyExclusiveCallbackGroup, Node, Time
@@ -43,6 +43,8 @@ def modules(spec: Any, own: Sequence[str]) -> Callable[[Any, Any], Callable[[str
         **{kind.__name__.lower(): {kind.__name__: kind} for kind in ENTITIES},
     }
     content: dict[str, Any] = {name: driven.module(f"rclpy.{name}", content) for name, content in inside.items()}
+    filters.Subscriber.subscribe = _subscribed
+    driven.module("message_filters", filters.CONTENT)
     driven.module("rclpy", content | {"Parameter": parameters.Parameter})
 
     def make(made: Any, params: Any) -> Any:
@@ -58,6 +60,11 @@ def modules(spec: Any, own: Sequence[str]) -> Callable[[Any, Any], Callable[[str
         return node
 
     return answers(driven, make)
+
+
+def _subscribed(act: Any, node: Node, kind: Any, topic: str, qos_profile: Any = 10, **more: Any) -> str:
+    node.create_subscription(kind, topic, act, qos_profile, **more)
+    return str(node._avow.whole(topic))
 
 
 class SingleThreadedExecutor(Strict):

@@ -7,6 +7,7 @@ import numbers
 from collections.abc import Callable, Sequence
 from typing import Any
 
+from . import filters
 from .callbacks import RESPONSE, Driven, answers
 from .refusals import Log, Strict
 
@@ -47,6 +48,13 @@ def modules(spec: Any, own: Sequence[str]) -> Callable[[Any, Any], Callable[[str
     }
     driven.install()
     driven.module("rospy", content)
+
+    def subscribed(act: Any, topic: str, kind: Any, **more: Any) -> str:
+        content["Subscriber"](topic, kind, act, **more)
+        return driven.whole(topic)
+
+    filters.Subscriber.subscribe = subscribed
+    driven.module("message_filters", filters.CONTENT)
 
     def make(made: Any, params: Any) -> Any:
         return made(params) if _takes(made) else made()

@@ -220,6 +220,36 @@ class Watch(LifecycleNode):
     def heard(self, message):
         self.allowed.publish(Float64(data=min(message.data, self.fastest)))
 """
+FUSED = """\
+node watch {
+  inputs( left : REAL, right : REAL )
+  outputs( most : REAL )
+  topics( sensor_msgs/Range left matches(in.left), sensor_msgs/Range right matches(in.right),
+          float64 most matches(out.most) )
+  guarantee greatest ( out.most >= in.left and out.most >= in.right )
+}
+"""
+PAIRS = """\
+from message_filters import ApproximateTimeSynchronizer, Subscriber, TimeSynchronizer
+from rclpy.node import Node
+from sensor_msgs.msg import Range
+from std_msgs.msg import Float64
+
+
+class Watch(Node):
+    def __init__(self):
+        super().__init__("watch")
+        self.most = self.create_publisher(Float64, "most", 10)
+        both = [Subscriber(self, Range, name, qos_profile=10) for name in ("left", "right")]
+        self.pairs = TimeSynchronizer(both, 5)
+        self.pairs.registerCallback(self.paired)
+
+    def paired(self, left, right):
+        assert left.header.stamp == right.header.stamp
+        self.most.publish(Float64(data=max(left.range, right.range)))
+"""
+RANGES = "{in.left: range, in.right: range}"
+NEAR = PAIRS.replace("TimeSynchronizer(both, 5)", "ApproximateTimeSynchronizer(both, 5, 0.05)").replace("assert", "#")
 NODES = {
     "an ament package": Made(LIMIT, PACKAGE, (("min(FASTEST", "max(FASTEST"), ("FASTEST = 1.5", "FASTEST = 1.75"))),
     "a catkin package with messages": Made(
@@ -245,6 +275,8 @@ NODES = {
     "callbacks of parameters": Made(
         LIMIT, {"src/tuned.py": TUNED}, (("value > 1.5", "value > 2.5"), ("to_value=10.0", "to_value=0.5"))
     ),
+    "messages of one stamp": Made(FUSED, {"src/pairs.py": PAIRS}, (("max(", "min("),), mapping=RANGES),
+    "messages of near stamps": Made(FUSED, {"src/pairs.py": NEAR}, (("right.range", "0.0"),), mapping=RANGES),
     "a lifecycle node": Made(
         LIMIT,
         {"src/camera.py": CAMERA},

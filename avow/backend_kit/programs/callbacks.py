@@ -37,7 +37,7 @@ STEP = SECOND // 10
 
 LARGEST = {"float32": float.fromhex("0x1.fffffep+127"), "float64": sys.float_info.max}
 
-_TIMES = {"builtin_interfaces/Time": "time", "builtin_interfaces/Duration": "duration"}
+_TIMES = ("builtin_interfaces/Time", "builtin_interfaces/Duration")
 _HEADER = Message(HEADER, (Field("stamp", Scalar("time")), Field("frame_id", Scalar("string"))))
 _ROS1_HEADER = Message(HEADER, (Field("seq", Scalar("uint32")), *_HEADER.fields))
 
@@ -66,6 +66,8 @@ class Run:
     on: str = ""
     state: str = ""
     """Of a lifecycle node, before its first message."""
+    together: Sequence[Sequence[str]] = ()
+    """Topics whose messages it takes together, by their stamps."""
 
     @property
     def raised(self) -> tuple[str, ...]:
@@ -162,26 +164,29 @@ class Driver:
         chance = random.Random(seed)
         topics = sorted(self.inputs)
         clauses = (*self.node.assumptions, *self.node.guarantees)
-        numbers = numbers_of(clause.formula for clause in clauses) | set(written(self.text)) | set(leaves(self.params))
-        drawing = _Drawing(pool(numbers), self.words(), self.known, chance)
+        numbers = (
+            numbers_of(clause.formula for clause in clauses)
+            | set(written(self.text))
+            | set(leaves(self.subject.params))
+        )
+        words = sorted({word for port in (*self.node.inputs, *self.node.outputs) for word in _words(port.sort)})
+        drawing = _Drawing(pool(numbers), words, self.known, chance)
         at = 0  # nanoseconds
+        alike: dict[str, Sequence[str]] = {topic: group for group in self.topics.together for topic in group}
+        due: list[str] = []
         for _ in range(messages if topics else 0):
-            topic = chance.choice(topics)
-            at += drawing.gap()
+            if not due:  # else at the time of the message before
+                due = [chance.choice(topics)]
+                others = [topic for topic in alike.get(due[0], ()) if topic in self.inputs and topic != due[0]]
+                due += others if others and chance.random() > NUMBERS_AGAIN else ()
+                at += drawing.gap()
+            topic = due.pop()
             kind = self.topics.heard[topic]
             made = drawing.message(Nested(kind), at)
             before = drawing.made.setdefault(kind, [])
             made = _with_floats(made, chance.choice(before)) if before and chance.random() < NUMBERS_AGAIN else made
             before.append(made)
             yield Event(topic, at, made)
-
-    def words(self) -> list[str]:
-        """The possible texts of the contract's types."""
-        return sorted({word for port in (*self.node.inputs, *self.node.outputs) for word in _words(port.sort)})
-
-    @property
-    def params(self) -> Mapping[str, Any]:
-        return self.subject.params
 
 
 def driver(system: System, name: str) -> Driver:
@@ -244,7 +249,7 @@ def _runs(
     except ToolMissing as missing:
         raise _refused(source, str(missing)) from None
     if told.silent:
-        raise Silent(_wrong(source, told.fault))
+        raise _refused(source, told.fault, Silent)
     if told.fault or len(told.replies) != len(asked):
         raise _refused(source, told.fault or "there is no answer")
     refused = dict.fromkeys(why for reply in told.replies for why in reply["refused"])
@@ -259,19 +264,17 @@ def _runs(
 
 def _made(reply: Mapping[str, Any]) -> Run:
     said = tuple(Event(topic, at, data, after) for topic, at, data, after in reply["said"])
-    return Run(said, reply["heard"], reply["spoken"], *(reply[name] for name in ("wrong", "after", "on", "state")))
+    return Run(
+        said, reply["heard"], reply["spoken"], *(reply[name] for name in ("wrong", "after", "on", "state", "together"))
+    )
 
 
 class Silent(Rejected):
     """There is no answer for a reason that is no fault of the class: a slow machine, or a kill from outside."""
 
 
-def _refused(source: Source, text: str) -> Rejected:
-    return Rejected(_wrong(source, text))
-
-
-def _wrong(source: Source, text: str) -> Diagnostic:
-    return Diagnostic("DRIVE103", text, source.place.at("source"), Severity.ERROR)
+def _refused(source: Source, text: str, kind: type[Rejected] = Rejected) -> Rejected:
+    return kind(Diagnostic("DRIVE103", text, source.place.at("source"), Severity.ERROR))
 
 
 def unusable(text: str) -> Rejected:
@@ -291,8 +294,7 @@ def _messages(node: Node, package: Path, known: Definitions, kind: Driving, dist
     wanted += [name for name in known.messages if name.partition("/")[0] in text]
     found: dict[str, Any] = {}
     if kind is Driving.RCLPY:
-        for name, sec in (("builtin_interfaces/Time", "int32"), ("builtin_interfaces/Duration", "int32")):
-            found[name] = {"fields": [["sec", sec], ["nanosec", "uint32"]], "constants": []}
+        found |= {name: {"fields": [["sec", "int32"], ["nanosec", "uint32"]], "constants": []} for name in _TIMES}
     while wanted:
         name = wanted.pop()
         message = known.get(name)
