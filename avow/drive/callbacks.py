@@ -23,7 +23,7 @@ from .steps import plain
 
 REQUEST, RESPONSE = "_Request", "_Response"
 """The ends of the names of a service's two message types."""
-STATE = ("said", "heard", "spoken", "due", "groups", "together")
+STATE = ("said", "heard", "spoken", "due", "groups", "together", "waiting", "dropped")
 """The attributes that loading the file may change, and each run changes."""
 
 
@@ -46,6 +46,10 @@ class Driven(Refusals, Messages):
         """Callback groups of callbacks (None: a node's own)."""
         self.together: list[list[str]] = []
         """Topics whose messages belong together by their stamps."""
+        self.waiting: dict[str, tuple[Callable[[Any], None], ...]] = {}
+        """Topic of a service's responses → what is done with the next ones."""
+        self.dropped: tuple[int, ...] = ()
+        """Responses that answer no request, by their numbers among all messages."""
         self.services: dict[Any, str] = {}
         """Class of a service → its type (``package/Type``)."""
         self.most: int = spec["most"]
@@ -129,19 +133,43 @@ class Driven(Refusals, Messages):
             self.count()
             self.call(act, self.value({"n": kind}, data))
 
-    def serve(self, name: Any, service: Any, act: Callable[[Any], Any]) -> str:
-        """A request is a message on a topic of its own, and answered at once on another; `act` returns the response."""
-        whole = self.whole(name)
+    def parts(self, name: Any, service: Any) -> tuple[str, str, str]:
+        """A service's whole name, and the topics of its requests and responses."""
         if service not in self.services:
             raise TypeError(f"{service!r} is no service class")
-        asked, told = f"{whole}/{REQUEST.lower()}", f"{whole}/{RESPONSE.lower()}"
+        whole = self.whole(name)
+        return whole, f"{whole}/{REQUEST.lower()}", f"{whole}/{RESPONSE.lower()}"
+
+    def serve(self, name: Any, service: Any, act: Callable[[Any], Any]) -> str:
+        """A service whose requests are answered at once: `act` returns the response."""
+        whole, asked, told = self.parts(name, service)
         if asked in self.heard:
             raise TypeError(f"{whole} has two servers")
         self.spoken[told] = self.services[service] + RESPONSE
-        self.heard[asked] = (
-            (self.services[service] + REQUEST, lambda request: self.say(told, self.call(act, request))),
-        )
+        kind = self.services[service] + REQUEST
+        self.heard[asked] = ((kind, lambda request: self.say(told, self.call(act, request))),)
         return whole
+
+    def ask(self, name: Any, service: Any) -> Callable[[Any, Callable[[Any], None]], None]:
+        """The function that sends a request to a service, and what is done with the response. Responses come in the
+        order of the requests."""
+        _, asked, told = self.parts(name, service)
+        self.spoken[asked] = self.services[service] + REQUEST
+
+        def answered(response: Any) -> None:
+            first, *rest = self.waiting.get(told) or (None,)
+            self.waiting[told] = tuple(rest)
+            if first is None:
+                self.dropped = (*self.dropped, self.handled)
+            else:
+                first(response)
+
+        def send(request: Any, act: Callable[[Any], None]) -> None:
+            self.waiting[told] = (*self.waiting.get(told, ()), act)
+            self.say(asked, request)
+
+        self.heard[told] = ((self.services[service] + RESPONSE, answered),)
+        return send
 
     # -- modules -----------------------------------------------------------------------------------------
 
@@ -206,6 +234,7 @@ def answers(driven: Driven, make: Callable[[Any, Any], Any]) -> Callable[[Any, A
                     "on": on,
                     "state": state,
                     "together": driven.together,
+                    "dropped": driven.dropped,
                 }
             )
 

@@ -131,7 +131,56 @@ class Clock(Strict):
         return Time(nanoseconds=self._driven.now)
 
 
-ENTITIES: tuple[Any, ...] = (Publisher, Timer, Subscription, Service, Clock)
+class Future(Strict):
+    _called = "rclpy.task.Future"
+
+    def __init__(self) -> None:
+        self._done, self._result, self._callbacks = False, None, list[Any]()
+
+    def done(self) -> bool:
+        return self._done
+
+    def result(self) -> Any:
+        return self._result
+
+    def exception(self) -> None:
+        """None: no response is an error."""
+
+    def cancelled(self) -> bool:
+        return False
+
+    def set_result(self, result: Any) -> None:
+        self._done, self._result = True, result
+        for callback in self._callbacks:
+            self.add_done_callback(callback)
+
+    def add_done_callback(self, callback: Any) -> None:
+        if self._done:
+            self._driven.later(self._driven.now, lambda: callback(self))
+        else:
+            self._callbacks.append(callback)
+
+
+class Client(Strict):
+    _called = "rclpy.client.Client"
+
+    def __init__(self, kind: Any, name: str) -> None:
+        self._send = self._driven.ask(name, kind)
+        self.srv_type, self.srv_name = kind, self._driven.whole(name)
+
+    def call_async(self, request: Any) -> Future:
+        future = Future()
+        self._send(request, future.set_result)
+        return future
+
+    def service_is_ready(self) -> bool:
+        return True
+
+    def wait_for_service(self, timeout_sec: Any = None) -> bool:
+        return True
+
+
+ENTITIES: tuple[Any, ...] = (Publisher, Timer, Subscription, Service, Client, Clock)
 
 
 class Node(Parameters):
@@ -177,6 +226,11 @@ class Node(Parameters):
         more.pop("qos_profile", None)
         self._avow_plain("Node.create_service", more)
         return Service(srv_type, srv_name, callback)
+
+    def create_client(self, srv_type: Any, srv_name: str, **more: Any) -> Any:
+        more.pop("qos_profile", None)
+        self._avow_plain("Node.create_client", more)
+        return Client(srv_type, srv_name)
 
     def destroy_timer(self, timer: Timer) -> bool:
         timer.cancel()

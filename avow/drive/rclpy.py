@@ -14,7 +14,7 @@ from typing import Any
 from . import filters, lifecycle, parameters
 from .callbacks import Driven, answers
 from .messages import INTEGERS
-from .nodes import ENTITIES, LOGS, Duration, MutuallyExclusiveCallbackGroup, Node, Time
+from .nodes import ENTITIES, LOGS, Duration, Future, MutuallyExclusiveCallbackGroup, Node, Time
 from .refusals import Log, Strict
 
 SECOND = 10**9
@@ -39,6 +39,7 @@ def modules(spec: Any, own: Sequence[str]) -> Callable[[Any, Any], Callable[[str
         "exceptions": parameters.EXCEPTIONS,
         "lifecycle": lifecycle.CONTENT,
         "logging": {"get_logger": lambda name="": Log(LOGS)},
+        "task": {"Future": Future},
         "parameter": {"Parameter": parameters.Parameter},
         **{kind.__name__.lower(): {kind.__name__: kind} for kind in ENTITIES},
     }

@@ -46,6 +46,8 @@ INSTEAD = {
     "ReentrantCallbackGroup": "MutuallyExclusiveCallbackGroup, if the callbacks may run one at a time",
     "create_rate": "create_timer",
     "MultiThreadedExecutor": "one callback group, if the callbacks may run one at a time",
+    "spin_until_future_complete": "call_async and add_done_callback",
+    "Client.call": "call_async and add_done_callback",
     "coroutine": "a callback without `await`",
     "Rate": "Timer",
     ".sleep": "a timer",

@@ -248,6 +248,37 @@ class Watch(Node):
         assert left.header.stamp == right.header.stamp
         self.most.publish(Float64(data=max(left.range, right.range)))
 """
+ASKED = """\
+node watch {
+  inputs( near : BOOL, free : BOOL )
+  outputs( asked : BOOL, go : BOOL )
+  topics( bool near matches(in.near), std_srvs/SetBool_Request gate matches(out.asked),
+          std_srvs/SetBool_Response gate matches(in.free), bool go matches(out.go) )
+  guarantee asks ( out.asked <=> in.near )
+  guarantee goes ( out.go -> in.free )
+}
+"""
+CLIENT = """\
+from rclpy.node import Node
+from std_msgs.msg import Bool
+from std_srvs.srv import SetBool
+
+
+class Watch(Node):
+    def __init__(self):
+        super().__init__("watch")
+        self.go = self.create_publisher(Bool, "go", 10)
+        self.gate = self.create_client(SetBool, "gate")
+        while not self.gate.wait_for_service(timeout_sec=1.0):
+            self.get_logger().info("no gate yet")
+        self.create_subscription(Bool, "near", self.heard, 10)
+
+    def heard(self, message):
+        self.gate.call_async(SetBool.Request(data=message.data)).add_done_callback(self.answered)
+
+    def answered(self, future):
+        self.go.publish(Bool(data=future.result().success))
+"""
 RANGES = "{in.left: range, in.right: range}"
 NEAR = PAIRS.replace("TimeSynchronizer(both, 5)", "ApproximateTimeSynchronizer(both, 5, 0.05)").replace("assert", "#")
 NODES = {
@@ -271,6 +302,12 @@ NODES = {
         (("success=True", "success=False"),),
         mapping="{out.held: success}",
         kind="rospy",
+    ),
+    "a client of a service": Made(
+        ASKED,
+        {"src/client.py": CLIENT},
+        (("=message.data", "=True"), ("future.result().success", "True"), ("self.gate.call_async", "self.gate.call")),
+        mapping="{in.free: success}",
     ),
     "callbacks of parameters": Made(
         LIMIT, {"src/tuned.py": TUNED}, (("value > 1.5", "value > 2.5"), ("to_value=10.0", "to_value=0.5"))

@@ -68,6 +68,8 @@ class Run:
     """Of a lifecycle node, before its first message."""
     together: Sequence[Sequence[str]] = ()
     """Topics whose messages it takes together, by their stamps."""
+    dropped: Sequence[int] = ()
+    """The messages that did not reach it, by their numbers: responses to no request."""
 
     @property
     def raised(self) -> tuple[str, ...]:
@@ -78,7 +80,8 @@ class Run:
     def beside(self, heard: Sequence[Event]) -> Iterator[Event]:
         """Messages received and published, in order of occurrence."""
         for number in range(len(heard) + 1):
-            yield from (replace(event, after=number) for event in heard[number - 1 : number] if number)
+            if number and number not in self.dropped:
+                yield replace(heard[number - 1], after=number)
             yield from (event for event in self.said if event.after == number)
 
 
@@ -252,7 +255,7 @@ def _runs(
         raise _refused(source, told.fault, Silent)
     if told.fault or len(told.replies) != len(asked):
         raise _refused(source, told.fault or "there is no answer")
-    refused = dict.fromkeys(why for reply in told.replies for why in reply["refused"])
+    refused = dict.fromkeys(why for reply in told.replies for why in reply.pop("refused"))
     if refused:
         raise _refused(source, f"{source.class_name} asks for what is not driven: {', '.join(refused)}")
     outside = [seen.path for seen in told.observed if seen.kind is Seen.OUTSIDE]
@@ -263,10 +266,7 @@ def _runs(
 
 
 def _made(reply: Mapping[str, Any]) -> Run:
-    said = tuple(Event(topic, at, data, after) for topic, at, data, after in reply["said"])
-    return Run(
-        said, reply["heard"], reply["spoken"], *(reply[name] for name in ("wrong", "after", "on", "state", "together"))
-    )
+    return Run(**{**reply, "said": tuple(Event(*each) for each in reply["said"])})
 
 
 class Silent(Rejected):
