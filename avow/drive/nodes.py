@@ -6,26 +6,25 @@ import functools
 from typing import Any
 
 from .parameters import Parameters
-from .refusals import Log, Strict
+from .refusals import Strict, nothing
 
 SECOND = 10**9
-LOGS = ("debug", "info", "warn", "warning", "error", "fatal")
 DEFAULTS = {"raw": False, "autostart": True, "start_parameter_services": True, "enable_rosout": True}
 DEFAULTS |= {"allow_undeclared_parameters": False, "automatically_declare_parameters_from_overrides": False}
-OF_NODES: tuple[str, ...] = ("create_", "destroy_", "get_", "set_", "add_", "remove_", "declare_", "undeclare_")
-OF_NODES += (
+OF_NODES: tuple[str, ...] = (
+    "create_",
+    "destroy_",
+    "get_",
+    "set_",
+    "add_",
+    "remove_",
+    "declare_",
+    "undeclare_",
     "describe_",
     "list_",
-    "has_",
-    "count_",
-    "resolve_",
-    "publishers",
-    "subscriptions",
-    "timers",
-    "services",
-    "clients",
 )
-OF_NODES += ("executor",)
+OF_NODES += ("has_", "count_", "resolve_", "publishers", "subscriptions", "timers", "services", "clients", "executor")
+OF_NODES += ("default_callback_group", "waitables", "guards")
 """Prefixes of names of rclpy's Node: such a name that is missing here is refused; other names are the class's own."""
 
 
@@ -52,6 +51,9 @@ class _Moment(Strict):
     def to_msg(self) -> Any:
         return self._driven.moment(self._wire, self.nanoseconds)
 
+    def seconds_nanoseconds(self) -> tuple[int, int]:
+        return divmod(self.nanoseconds, SECOND)
+
     @classmethod
     def from_msg(cls, message: Any, clock_type: Any = None) -> Any:
         return cls(nanoseconds=cls._driven.nanoseconds(cls._wire, message))
@@ -75,6 +77,14 @@ class Time(_Moment):
             return NotImplemented
         kind: Any = Duration if type(other) is Time else Time
         return kind(nanoseconds=self.nanoseconds - other.nanoseconds)
+
+
+class Log(Strict):
+    _called = "rclpy.impl.rcutils_logger.RcutilsLogger"
+    debug = info = warn = warning = error = fatal = set_level = staticmethod(nothing)
+
+    def get_child(self, name: str) -> Log:
+        return self
 
 
 class Publisher(Strict):
@@ -240,7 +250,7 @@ class Node(Parameters):
         return Clock()
 
     def get_logger(self) -> Any:
-        return Log(LOGS)
+        return Log()
 
     def get_name(self) -> str:
         return str(self._avow.name.rpartition("/")[2])
@@ -255,6 +265,6 @@ class Node(Parameters):
         raise self._avow.refuse("rclpy.node.Node.destroy_node")
 
     def __getattr__(self, name: str) -> Any:
-        if name.startswith(OF_NODES):
+        if name.startswith(OF_NODES) or name in ("context", "handle"):
             raise self._avow.refuse(f"rclpy.node.Node.{name}")
         raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")

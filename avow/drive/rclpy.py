@@ -6,7 +6,6 @@ import array
 import inspect
 import math
 import sys
-import types
 from collections import UserList, UserString
 from collections.abc import Callable, Sequence, Set
 from typing import Any
@@ -14,8 +13,8 @@ from typing import Any
 from . import filters, lifecycle, parameters
 from .callbacks import Driven, answers
 from .messages import INTEGERS
-from .nodes import ENTITIES, LOGS, Duration, Future, MutuallyExclusiveCallbackGroup, Node, Time
-from .refusals import Log, Strict
+from .nodes import ENTITIES, Duration, Future, Log, MutuallyExclusiveCallbackGroup, Node, Time
+from .refusals import Strict
 
 SECOND = 10**9
 LARGEST = {"float32": 3.402823466e38, "float64": 1.7976931348623157e308}
@@ -38,7 +37,7 @@ def modules(spec: Any, own: Sequence[str]) -> Callable[[Any, Any], Callable[[str
         "executors": {kind.__name__: kind for kind in (SingleThreadedExecutor, MultiThreadedExecutor, _Shutdown)},
         "exceptions": parameters.EXCEPTIONS,
         "lifecycle": lifecycle.CONTENT,
-        "logging": {"get_logger": lambda name="": Log(LOGS)},
+        "logging": {"get_logger": lambda name="": Log()},
         "task": {"Future": Future},
         "parameter": {"Parameter": parameters.Parameter},
         **{kind.__name__.lower(): {kind.__name__: kind} for kind in ENTITIES},
@@ -46,7 +45,7 @@ def modules(spec: Any, own: Sequence[str]) -> Callable[[Any, Any], Callable[[str
     content: dict[str, Any] = {name: driven.module(f"rclpy.{name}", content) for name, content in inside.items()}
     filters.Subscriber.subscribe = _subscribed
     driven.module("message_filters", filters.CONTENT)
-    driven.module("rclpy", content | {"Parameter": parameters.Parameter})
+    driven.module("rclpy", content | {"Parameter": parameters.Parameter, "ok": lambda context=None: True})
 
     def make(made: Any, params: Any) -> Any:
         if not issubclass(made, Node):
@@ -146,15 +145,14 @@ def _qos() -> dict[str, Any]:
         def __init__(self, **named: Any) -> None:
             vars(self).update(named)
 
-    def policy(name: str, *words: str) -> Any:
-        return types.SimpleNamespace(**{word: f"{name}.{word}" for word in words})
-
     qos: dict[str, Any] = {"QoSProfile": QoSProfile}
-    for short, long, words in (
-        ("Reliability", "QoSReliabilityPolicy", ("RELIABLE", "BEST_EFFORT", "SYSTEM_DEFAULT")),
-        ("Durability", "QoSDurabilityPolicy", ("VOLATILE", "TRANSIENT_LOCAL", "SYSTEM_DEFAULT")),
-        ("History", "QoSHistoryPolicy", ("KEEP_LAST", "KEEP_ALL", "SYSTEM_DEFAULT")),
+    for short, words in (
+        ("Reliability", ("RELIABLE", "BEST_EFFORT", "SYSTEM_DEFAULT", "BEST_AVAILABLE")),
+        ("Durability", ("VOLATILE", "TRANSIENT_LOCAL", "SYSTEM_DEFAULT", "BEST_AVAILABLE")),
+        ("History", ("KEEP_LAST", "KEEP_ALL", "SYSTEM_DEFAULT")),
+        ("Liveliness", ("AUTOMATIC", "MANUAL_BY_TOPIC", "SYSTEM_DEFAULT", "BEST_AVAILABLE")),
     ):
-        qos |= dict.fromkeys((f"{short}Policy", long), policy(short, *words))
-    qos |= dict.fromkeys(("qos_profile_sensor_data", "qos_profile_system_default"), QoSProfile(depth=10))
-    return qos
+        content = {"_called": f"rclpy.qos.{short}Policy", **{word: f"{short}Policy.{word}" for word in words}}
+        qos |= dict.fromkeys((f"{short}Policy", f"QoS{short}Policy"), type(f"{short}Policy", (Strict,), content)())
+    profiles = [f"qos_profile_{name}" for name in ("sensor_data", "system_default", "services_default", "parameters")]
+    return qos | {name: QoSProfile(depth=10) for name in profiles}

@@ -9,7 +9,7 @@ from typing import Any
 
 from . import filters
 from .callbacks import RESPONSE, Driven, answers
-from .refusals import Log, Strict
+from .refusals import Strict, nothing
 
 SECOND = 10**9
 LOGS = ("logdebug", "loginfo", "logwarn", "logerr", "logfatal")
@@ -31,7 +31,7 @@ def modules(spec: Any, own: Sequence[str]) -> Callable[[Any, Any], Callable[[str
         pass
 
     every = [f"{name}{kind}" for name in LOGS for kind in ("", "_once", "_throttle", "_throttle_identical")]
-    content: dict[str, Any] = dict.fromkeys(every, Log.nothing)
+    content: dict[str, Any] = dict.fromkeys(every, nothing)
     content |= {cls.__name__: cls for cls in (*_endpoints(driven), time, duration, ROSException)}
     content["ROSInterruptException"] = ROSInterruptException
     content |= {
@@ -44,7 +44,7 @@ def modules(spec: Any, own: Sequence[str]) -> Callable[[Any, Any], Callable[[str
         "get_namespace": lambda: driven.name.rpartition("/")[0] + "/",
         "resolve_name": driven.whole,
         "is_shutdown": lambda: False,
-        "on_shutdown": Log.nothing,
+        "on_shutdown": nothing,
     }
     driven.install()
     driven.module("rospy", content)

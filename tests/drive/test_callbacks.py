@@ -297,6 +297,9 @@ def test_fields_of_ros_2_take_what_its_setters_take(tmp_path: Path) -> None:
 
 
 UNSUPPORTED = {  # what of rclpy is used, and what is told besides its name and line
+    "self.context": "rclpy.node.Node.context (watch.py, line {})",
+    "from rclpy.qos import HistoryPolicy as H; H.LATEST": "rclpy.qos.HistoryPolicy.LATEST (watch.py, line {})",
+    "self.get_logger().fatally": "RcutilsLogger.fatally (watch.py, line {})",
     "self.create_guard_condition(print)": "rclpy.node.Node.create_guard_condition (watch.py, line {})",
     "self.add_pre_set_parameters_callback(print)": "Node.add_pre_set_parameters_callback (watch.py, line {})",
     "self.create_timer(1.0, print, clock=self.get_clock())": "create_timer(clock=) (watch.py, line {}); instead: ",
@@ -324,6 +327,8 @@ def test_typed_parameter_values_and_exclusive_groups_are_driven(tmp_path: Path) 
     values |= {"[3]": "integer_array", "[2.5]": "double_array", "['a']": "string_array"}
     lines = "from rclpy.callback_groups import MutuallyExclusiveCallbackGroup as G; wrong = []"
     lines += "\n        self.create_subscription(String, 's', print, 1, callback_group=G())"
+    lines += "\n        self.get_logger().get_child('x').warn('a', once=True)"
+    lines += "\n        import rclpy; assert rclpy.ok() and self.get_clock().now().seconds_nanoseconds() <= (1, 0)"
     lines += "\n        self.create_timer(9.0, print, callback_group=G()); self.create_timer(9.0, print, None)"
     for value, kind in values.items():
         name = f"p{kind}"
