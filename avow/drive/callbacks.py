@@ -35,6 +35,8 @@ class Driven(Refusals, Messages):
         Messages.__init__(self, spec)
         Strict._driven = self
         self.name: str = spec["name"]
+        self.topics = frozenset(spec["topics"])
+        """The contract's."""
         self.remaps: list[list[str]] = spec["remaps"]
         self.params: Any = {}
         self.now = 0
@@ -107,12 +109,14 @@ class Driven(Refusals, Messages):
             raise self.refuse("a callback that is a coroutine")
         return returned
 
-    def hear(self, topic: Any, kind: Any, act: Callable[[Any], Any]) -> None:
+    def hear(self, topic: Any, kind: Any, act: Callable[[Any], Any]) -> tuple[str, Any]:
+        """The topic's whole name, and what is in `heard` for it."""
         whole, name = self.whole(topic), self.type_of(kind)
         others = self.heard.get(whole, ())
         if any(other != name for other, _ in others):
             raise TypeError(f"{whole} is {others[0][0]}, and heard as {name}")
         self.heard[whole] = (*others, (name, act))
+        return whole, self.heard[whole][-1]
 
     def speak(self, topic: Any, kind: Any) -> str:
         whole, name = self.whole(topic), self.type_of(kind)
@@ -209,6 +213,8 @@ def answers(driven: Driven, make: Callable[[Any, Any], Any]) -> Callable[[Any, A
             try:
                 node = make(made, driven.params)
                 state = getattr(node, "_avow_state", "")
+                if state and not asked["events"]:
+                    node._avow_activate()  # for its topics
                 for topic, at, data in asked["events"]:
                     driven.until(int(at))
                     driven.handled, on = driven.handled + 1, topic
@@ -225,7 +231,7 @@ def answers(driven: Driven, make: Callable[[Any, Any], Any]) -> Callable[[Any, A
                 )
             return json.dumps(
                 {
-                    "heard": {topic: kinds[0][0] for topic, kinds in driven.heard.items()},
+                    "heard": {topic: kinds[0][0] for topic, kinds in driven.heard.items() if kinds},
                     "spoken": driven.spoken,
                     "said": driven.said,
                     "refused": driven.refused,

@@ -42,12 +42,25 @@ class LifecyclePublisher(Publisher):
 
 
 class LifecycleNode(Node):
-    """A node that is configured and activated before its first message."""
+    """A node that is configured and activated before its first message, unless the contract has its transitions."""
 
     def __init__(self, node_name: str, *, enable_communication_interface: bool = True, **more: Any) -> None:
         super().__init__(node_name, **more)
         self._avow_state = "unconfigured"
         self._avow_managed: list[LifecyclePublisher] = []
+        self._avow_asked_for = f"{self._avow.name}/change_state/_request" in self._avow.topics
+        if self._avow_asked_for:
+            service = next(kind for kind, name in self._avow.services.items() if name == "lifecycle_msgs/ChangeState")
+            self._avow.serve(
+                "~/change_state", service, lambda request: service.Response(success=self._avow_ask(request))
+            )
+
+    def _avow_ask(self, request: Any) -> bool:
+        """Whether the requested transition succeeds."""
+        number, state = request.transition.id, STATES[self._avow_state].state_id
+        known = {**dict(enumerate(TRANSITIONS, 1)), state + 4: "shutdown"}
+        name = str(request.transition.label or known.get(number))
+        return name in known.values() and self._avow_go(name) is TransitionCallbackReturn.SUCCESS
 
     def create_lifecycle_publisher(self, msg_type: Any, topic: str, qos_profile: Any, **more: Any) -> Any:
         self._avow_managed.append(self._avow_publisher(LifecyclePublisher, msg_type, topic, more))

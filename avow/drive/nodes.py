@@ -125,6 +125,9 @@ class Timer(Strict):
 class Subscription(Strict):
     _called = "rclpy.subscription.Subscription"
 
+    def __init__(self, topic: str, entry: Any) -> None:
+        self.topic_name, self.entry = topic, entry
+
 
 class Service(Strict):
     _called = "rclpy.service.Service"
@@ -214,8 +217,7 @@ class Node(Parameters):
 
     def create_subscription(self, msg_type: Any, topic: str, callback: Any, qos_profile: Any, **more: Any) -> Any:
         self._avow_plain("Node.create_subscription", more)
-        self._avow.hear(topic, msg_type, callback)
-        return Subscription()
+        return Subscription(*self._avow.hear(topic, msg_type, callback))
 
     def create_publisher(self, msg_type: Any, topic: str, qos_profile: Any, **more: Any) -> Any:
         return self._avow_publisher(Publisher, msg_type, topic, more)
@@ -245,6 +247,17 @@ class Node(Parameters):
     def destroy_timer(self, timer: Timer) -> bool:
         timer.cancel()
         return True
+
+    def destroy_subscription(self, subscription: Subscription) -> bool:
+        heard, topic = self._avow.heard, subscription.topic_name
+        heard[topic] = tuple(entry for entry in heard[topic] if entry is not subscription.entry)
+        return True
+
+    def destroy_publisher(self, publisher: Publisher) -> bool:
+        publisher.topic_name = ""  # publishing raises
+        return True
+
+    destroy_lifecycle_publisher = destroy_publisher
 
     def get_clock(self) -> Any:
         return Clock()

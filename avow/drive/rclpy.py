@@ -51,7 +51,7 @@ def modules(spec: Any, own: Sequence[str]) -> Callable[[Any, Any], Callable[[str
         if not issubclass(made, Node):
             raise TypeError(f"{made.__name__} is no rclpy.node.Node")
         node = made()
-        if isinstance(node, lifecycle.LifecycleNode):
+        if isinstance(node, lifecycle.LifecycleNode) and not node._avow_asked_for:
             node._avow_activate()
         node._avow_all_declared()
         text = inspect.getsource(sys.modules[made.__module__])

@@ -190,7 +190,8 @@ STANDARD: dict[str, Message] = {
     )
     for base, name in _STANDARD_NAMES.items()
 }
-"""The messages that carry one built-in value, and the calls of std_srvs: the same in every ROS distribution."""
+"""The messages that carry one built-in value, the calls of std_srvs, and that of a transition: the same in every ROS
+distribution."""
 
 _FIELD = re.compile(
     r"(?P<type>[A-Za-z][A-Za-z0-9_/]*)(?:<=(?P<bound>\d+))?(?P<array>\[(?P<size>(?:<=)?\d*)\])?\s+"
@@ -269,8 +270,9 @@ def parse_parts(text: str, name: str, kind: str, source: str = "") -> tuple[Mess
 
 
 for _name, _text in (
-    ("Empty", "---"),
-    ("SetBool", "bool data\n---\nbool success\nstring message"),
-    ("Trigger", "---\nbool success\nstring message"),
+    ("std_srvs/Empty", "---"),
+    ("std_srvs/SetBool", "bool data\n---\nbool success\nstring message"),
+    ("std_srvs/Trigger", "---\nbool success\nstring message"),
+    ("lifecycle_msgs/ChangeState", "Transition transition\n---\nbool success"),
 ):
-    STANDARD |= {message.name: message for message in parse_parts(_text, f"std_srvs/{_name}", "srv", "std_srvs")}
+    STANDARD |= {message.name: message for message in parse_parts(_text, _name, "srv", _name.partition("/")[0])}

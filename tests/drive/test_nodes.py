@@ -32,6 +32,7 @@ class Made:
     params: str = ""
     mapping: str = "{}"
     kind: str = "rclpy"
+    cases: int = 300
 
 
 def system(folder: Path, made: Made) -> Path:
@@ -41,7 +42,7 @@ def system(folder: Path, made: Made) -> Path:
     (folder / "plan.yaml").write_text(
         "system: w\ncontract: system.rcl\nros: {distro: humble}\nnodes:\n  watch:\n"
         f"    source: {{python: {next(iter(made.files))}, class: Watch, kind: {made.kind}, parameters: params.yaml}}\n"
-        f"    mapping: {made.mapping}\n    methods: [hypothesis: {{cases: 300}}]\n{made.options}",
+        f"    mapping: {made.mapping}\n    methods: [hypothesis: {{cases: {made.cases}}}]\n{made.options}",
         encoding="utf-8",
     )
     return folder
@@ -279,8 +280,58 @@ class Watch(Node):
     def answered(self, future):
         self.go.publish(Bool(data=future.result().success))
 """
+TURNED = """\
+context { Turn : {configure, activate, deactivate, cleanup, shutdown}; }
+node watch {
+  inputs( turn : Turn, speed : REAL )
+  outputs( turned : BOOL, motor : REAL )
+  topics( lifecycle_msgs/ChangeState_Request watch/change_state matches(in.turn),
+          lifecycle_msgs/ChangeState_Response watch/change_state matches(out.turned),
+          float64 speed matches(in.speed), float64 motor matches(out.motor) )
+  guarantee still ( in.turn == deactivate -> out.motor == 0 )
+  guarantee bound ( out.motor <= in.speed or out.motor == 0 )
+}
+"""
+MOTOR = """\
+from rclpy.lifecycle import LifecycleNode, TransitionCallbackReturn
+from std_msgs.msg import Float64
+
+
+class Watch(LifecycleNode):
+    on = False
+
+    def __init__(self):
+        super().__init__("watch")
+
+    def on_configure(self, state):
+        self.motor = self.create_publisher(Float64, "motor", 10)
+        self.speed = self.create_subscription(Float64, "speed", self.move, 10)
+        return TransitionCallbackReturn.SUCCESS
+
+    def on_activate(self, state):
+        self.on = True
+        return super().on_activate(state)
+
+    def on_deactivate(self, state):
+        self.on = False
+        self.motor.publish(Float64())
+        return super().on_deactivate(state)
+
+    def on_cleanup(self, state):
+        self.destroy_subscription(self.speed)
+        self.destroy_publisher(self.motor)
+        return TransitionCallbackReturn.SUCCESS
+
+    def on_shutdown(self, state):
+        self.on = False
+        return TransitionCallbackReturn.SUCCESS
+
+    def move(self, message):
+        self.motor.publish(Float64(data=message.data if self.on else 0.0))
+"""
 RANGES = "{in.left: range, in.right: range}"
 NEAR = PAIRS.replace("TimeSynchronizer(both, 5)", "ApproximateTimeSynchronizer(both, 5, 0.05)").replace("assert", "#")
+BEGINS = {"a lifecycle node": "active", "transitions": "unconfigured"}
 NODES = {
     "an ament package": Made(LIMIT, PACKAGE, (("min(FASTEST", "max(FASTEST"), ("FASTEST = 1.5", "FASTEST = 1.75"))),
     "a catkin package with messages": Made(
@@ -314,6 +365,13 @@ NODES = {
     ),
     "messages of one stamp": Made(FUSED, {"src/pairs.py": PAIRS}, (("max(", "min("),), mapping=RANGES),
     "messages of near stamps": Made(FUSED, {"src/pairs.py": NEAR}, (("right.range", "0.0"),), mapping=RANGES),
+    "transitions": Made(
+        TURNED,
+        {"src/motor.py": MOTOR},
+        (("self.on = False\n        self.motor", "self.motor"), ("self.destroy_subscription(self.speed)", "pass")),
+        mapping="{in.turn: transition.label, out.turned: success}",
+        cases=1500,
+    ),
     "a lifecycle node": Made(
         LIMIT,
         {"src/camera.py": CAMERA},
@@ -329,7 +387,7 @@ def test_a_node_is_driven_and_its_mutants_are_caught(tmp_path: Path, name: str) 
     made = NODES[name]
     found = verdicts(system(tmp_path / "right", made))
     assert {o.verdict for o in found.values()} == {Verdict.TESTED}, found
-    assert {o.bound.get("begins") for o in found.values()} == {"active" if name == "a lifecycle node" else None}
+    assert {o.bound.get("begins") for o in found.values()} == {BEGINS.get(name)}
     for number, (old, new) in enumerate(made.mutants):
         files = {path: text.replace(old, new) for path, text in made.files.items()}
         assert files != made.files, old

@@ -225,6 +225,7 @@ def driver(system: System, name: str) -> Driver:
         "name": placed.name,
         "remaps": [list(pair) for pair in placed.remaps],
         "most": DRIVEN_CALLBACKS,
+        "topics": [whole_name(plan.ros.names, node, topic) for topic in node.topics],
         "messages": _messages(node, package, known, source.kind, plan.ros.distro),
     }
     subject = Subject(root, path, source.class_name, params, {}, (), ros)
