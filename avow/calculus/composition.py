@@ -21,7 +21,7 @@ from avow.calculus.subsystem_contracts import Level, Said, composed_node, innerm
 from avow.calculus.transition import Machine
 from avow.calculus.variables import Frame, frame
 from avow.formulas.finite import interpretation
-from avow.formulas.formula import digest, sort_digest, substitute
+from avow.formulas.formula import digest, free_variables, sort_digest, substitute
 from avow.formulas.temporal.clock import one_pace
 from avow.kernel.solvers import Solvers
 from avow.language.contract import Clause, ClauseKind, Node, Port
@@ -30,7 +30,7 @@ from avow.language.subterms import histories, ports_of
 from avow.language.terms import History, Not, Past, Role, Term, Variable
 from avow.sanity import results
 from avow.sanity.analysis import analyse
-from avow.sanity.claims import Property
+from avow.sanity.claims import Property, node_key, triggers
 from avow.sanity.over_runs import OverRuns
 from avow.sanity.results import SanityResult
 from avow.system.folding import face, fold, inner_first, leaves, outermost, parents
@@ -239,6 +239,28 @@ class Composition:
             ports = tuple(v.name for v in ports_of(flat.system.contract.node(name.node).clause(name.clause).formula))
             if ports and not any(Endpoint(name.node, port) in flat.graph.by_target for port in ports):
                 yield name, ports
+
+    def restricting(self, node: str, situation: Term) -> dict[str, Term]:
+        """The clauses of a node that may exclude a situation. A realizable node has outputs for all inputs that it
+        assumes, so its guarantees exclude no situation that mentions inputs only."""
+        frame, of = self.frame, self.frame.node(node)
+        outputs = {frame.output(node, port.name) for port in of.outputs}
+        if node in frame.cells or outputs & free_variables(situation):
+            return frame.contracts((node,))
+        return {f"{node}.{a.name}": frame.clause(node, a.name) for a in of.assumptions}
+
+    def read_of(self, name: str) -> str:
+        """Digest of what `EnvironmentQuestion` reads of a node: what its guarantees are about, and what restricts that;
+        if other steps matter, all of it."""
+        node = self.frame.system.contract.node(name)
+        if self.frame.constants or any(histories(c.formula) for c in (*self.surroundings.assumptions, *node.clauses)):
+            return f"{name} {node_key(node)}"
+        found = list[str]()
+        for guarantee in self.frame.node(name).guarantees:
+            for situation in triggers(self.frame.clause(name, guarantee.name)):
+                known = self.restricting(name, situation)
+                found.append(f"{guarantee.name} {digest(situation)} {digest(*known.values())}")
+        return "\n".join([name, *sorted(found)])
 
     @property
     def surroundings(self) -> Node:

@@ -6,6 +6,7 @@ hypotheses of an answer are given as other obligations, which the assurance case
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import chain
@@ -184,15 +185,20 @@ def _goal_tasks(composition: Composition, goal: Goal) -> Iterator[Task]:
 
 def _environment_tasks(composition: Composition) -> Iterator[Task]:
     frame = composition.frame
-    together = node_key(composition.surroundings)
     read = sorted({endpoint.node for endpoint in frame.graph.environment})
-    readers = sha256("\n".join(map(composition.meanings.node, read)))
+
+    @functools.cache
+    def around(given: bool) -> str:
+        """All that the answer depends on besides the claim, if the plan gives a reason; otherwise it is open."""
+        parts = (node_key(composition.surroundings), *map(composition.read_of, read)) if given else ()
+        return sha256("\n".join(parts))
+
     for assumed in frame.assumed:
         yield _task(
             frame,
             f"environment.{assumed.port}",
             f"the environment gives {assumed.port} as assumed",
-            ("environment", composition.meanings.environment([assumed.port]), together, readers),
+            ("environment", composition.meanings.environment([assumed.port]), around(bool(assumed.because))),
             questions.EnvironmentQuestion(assumed.because, f"environment {assumed.port}"),
             formula=show_term(assumed.formula),
             span=next(e for e in frame.system.plan.environment if e.port == assumed.port).span,
@@ -203,7 +209,7 @@ def _environment_tasks(composition: Composition) -> Iterator[Task]:
                 frame,
                 f"environment.{entry.constancy}",
                 f"the environment gives {entry.port} the same value at every step",
-                ("constant", entry.port, together, readers),
+                ("constant", entry.port, around(True)),
                 questions.EnvironmentQuestion(entry.stays or f"{entry.port} is the same at every step"),
                 span=entry.span,
             )
@@ -217,7 +223,7 @@ def _environment_tasks(composition: Composition) -> Iterator[Task]:
             frame,
             f"environment.{name}",
             f"the environment meets what {name.node} assumes in {name.clause}",
-            ("environment", digest(frame.clause(name.node, name.clause)), together, readers),
+            ("environment", digest(frame.clause(name.node, name.clause)), around(bool(because))),
             questions.EnvironmentQuestion(because, str(name)),
             formula=show_clause(clause, node),
             clauses=(str(name),),

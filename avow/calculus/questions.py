@@ -376,7 +376,7 @@ class EnvironmentQuestion:
                 for situation in triggers(frame.clause(node, guarantee.name)):
                     if not set(about) & set(ports_of(situation)):
                         continue
-                    known = frame.contracts((node,)) | environment
+                    known = composition.restricting(node, situation) | environment
                     answer = implied(known, negation(situation), effort=DEFEAT_EFFORT, whether=True)
                     if answer.verdict is Verdict.PROVED and self.label in answer.needed:
                         yield f"{node}.{guarantee.name}"

@@ -18,16 +18,7 @@ from avow.base.tuning.bounds import NODE_ANSWERS
 from avow.base.tuning.effort import SEARCH_STEPS
 from avow.calculus.cut_off import another_first, first_cut
 from avow.calculus.narrowing import Holds, Narrowing, Undecided, Unknown, Values, decided, forcings
-from avow.calculus.node_outputs import (
-    Answerer,
-    Doubts,
-    Stuck,
-    by_variable,
-    is_restricted,
-    judge,
-    possible,
-    search,
-)
+from avow.calculus.node_outputs import Answerer, Doubts, Stuck, by_variable, is_restricted, judge, possible, search
 from avow.calculus.scenario import CannotRun, World, key
 from avow.evaluation.evaluate import NotEvaluable, compile_term
 from avow.formulas.formula import free_variables

@@ -74,6 +74,13 @@ def test_an_environment_in_which_a_guarantee_is_about_nothing_supports_nothing(
     assert ("n.high" in outcome.summary) is excluded
 
 
+@pytest.mark.parametrize(("promised", "excluded"), [("out.s == in.r", True), ("out.s >= in.r", False)])
+def test_guarantees_count_where_a_condition_mentions_outputs(promised: str, excluded: bool, tmp_path: Path) -> None:
+    text = node("n", "r : REAL", "y : BOOL, s : REAL", "G high: in.r + out.s >= 240 -> out.y", f"G same: {promised}")
+    plan = "environment: {in.r: {assume: 'in.r < 120', because: it is so}}\n"
+    assert outcomes(make(tmp_path, text, plan))["environment.in.r"].vacuous is excluded
+
+
 @pytest.mark.parametrize(
     ("assumed", "excluded"),
     [("in.r < 120", True), ("in.r < 130", False), ("in.r < in.s", False), ("in.r < in.s and in.s < 119", True)],

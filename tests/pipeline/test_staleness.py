@@ -104,6 +104,12 @@ FERRY_EDITS: dict[str, tuple[str, tuple[str, str], Callable[[Keys], set[tuple[st
         lambda k: guarantees("gauge", "shallow good deep", "hoare hypothesis") | sanity(k, "gauge") | WHOLE | SAFE,
         CHAIN | ROOM,
     ),
+    "what a guarantee demands": (
+        "*.rcl",
+        ("in.depth < Minimum -> out.level == low", "in.depth < Minimum -> out.level == high"),
+        lambda k: guarantees("gauge", "shallow", "hoare hypothesis") | sanity(k, "gauge") | WHOLE | SAFE,
+        CHAIN | guarantees("gauge", "good deep", "hoare hypothesis"),
+    ),
     "a flipped operator": (
         "*.rcl",
         ("in.depth > Maximum", "in.depth >= Maximum"),
