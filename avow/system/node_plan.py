@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 import math
 import re
 from collections.abc import Iterator, Mapping
@@ -184,9 +185,7 @@ def parameters(root: Path, source: Source, name: str) -> tuple[Mapping[str, Any]
     place, path = source.place.at("source", "parameters"), inside(root, source.parameters)
     try:
         assert path is not None
-        data = read_regular(path)
-        piece, faults = read_yaml(data, str(path))
-        loaded = yaml.safe_load(data)
+        piece, faults, loaded = _read(read_regular(path), str(path))
     except Rejected as rejected:
         return {}, rejected.diagnostics
     except (OSError, AssertionError, ValueError, yaml.YAMLError, RecursionError) as error:
@@ -205,6 +204,12 @@ def parameters(root: Path, source: Source, name: str) -> tuple[Mapping[str, Any]
     return loaded, wrong
 
 
+@functools.lru_cache(16)
+def _read(data: bytes, path: str) -> tuple[Piece, tuple[Diagnostic, ...], Any]:
+    """A text as the strict reader and as YAML's own reads it, once for all nodes. Raises what they raise."""
+    return (*read_yaml(data, path), yaml.safe_load(data))
+
+
 def never_read(plan: Plan) -> Iterator[Diagnostic]:
     """A warning for each parameter that no Python file beside the source mentions: it changes nothing. A class of ROS 2
     declares its parameters, so that driving it finds them."""
@@ -220,9 +225,8 @@ def never_read(plan: Plan) -> Iterator[Diagnostic]:
                 lost = [part for part in name.split(".") if not re.search(rf"\b{re.escape(part)}\b".encode(), text)]
                 if lost:
                     message = f"`{source.parameters}` sets {name}; no Python file beside {path.name} has `{lost[0]}`"
-                    hint = "correct its name, or remove it"
                     span = source.place.at("source", "parameters")
-                    yield Diagnostic("PLAN136", message, span, Severity.WARNING, hint=hint)
+                    yield Diagnostic("PLAN136", message, span, Severity.WARNING, "correct its name, or remove it")
 
 
 def _unclear(strict: Any, loaded: Any, where: str) -> Iterator[str]:

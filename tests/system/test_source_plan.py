@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from avow.base.diagnostics import Rejected
+from avow.system import node_plan
 from avow.system.load import load_system
 from avow.system.node_plan import never_read, parameters
 from avow.system.plan import Numbers, Source
@@ -83,13 +84,21 @@ def test_parameters_that_are_no_plain_mapping(text: str, tmp_path: Path) -> None
         ("elsewhere: 3\n", []),
     ],
 )
-def test_parameters_that_no_file_mentions(text: str, lost: list[str], kind: str, tmp_path: Path) -> None:
+def test_parameters_that_no_file_mentions(
+    text: str, lost: list[str], kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    read: list[bytes] = []
+    reader = node_plan.read_yaml
+    monkeypatch.setattr(node_plan, "read_yaml", lambda data, file: (read.append(data), reader(data, file))[1])
     node = f"    source: {{python: src.py, class: Watchdog, parameters: p.yaml{kind}}}\n"
     load(tmp_path, node)
     (tmp_path / "src.py").write_text("class Watchdog:\n    USED = ('timeout', 'gains', 'p')\n")
     (tmp_path / "helper.py").write_text("def of(params):\n    return params['elsewhere']\n")
     (tmp_path / "p.yaml").write_text(text)
-    found = list(never_read(load_system(tmp_path).plan))
+    plan = load_system(tmp_path).plan
+    found = list(never_read(plan))
+    assert list(never_read(plan)) == found
+    assert len(read) <= 1, "a file that has not changed is read once"
     assert [d.message.rpartition("has ")[2] for d in found] == [f"`{name}`" for name in lost]
     assert {d.code for d in found} <= {"PLAN136"}
     assert not any(d.is_error for d in found)
