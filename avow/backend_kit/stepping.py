@@ -18,7 +18,7 @@ from avow.base.records import dataclass
 from avow.base.tuning.bounds import COUNTS_GUESSED
 from avow.formulas.formula import equation, free_variables, substitute
 from avow.formulas.temporal.cell import Cell, Unsaid
-from avow.formulas.temporal.cells import Records, written
+from avow.formulas.temporal.cells import Records
 from avow.formulas.traversal import transform
 from avow.language import terms as t
 from avow.language.contract import Clause, ClauseKind, Contract, Node, Port
@@ -219,8 +219,8 @@ def _counters(counter: t.Variable, cell: Cell) -> Iterator[t.Term]:
 
 def _limits(cell: Cell) -> tuple[int, ...]:
     """The numbers in a state variable's definition."""
-    numbers = map(written, subterms(cell.now))
-    return tuple(dict.fromkeys(number for number in numbers if number is not None and number > 0))
+    values = (part.value for part in subterms(cell.now) if isinstance(part, t.Literal) and part.sort != BOOL)
+    return tuple(dict.fromkeys(value for value in values if isinstance(value, int) and value > 0))
 
 
 def _conditions(variable: t.Variable) -> Iterator[t.Term]:

@@ -326,7 +326,8 @@ _SORTS = (
     Code(
         "RCL323",
         "wrong limit",
-        "`held`, `within` and `for` need a limit; `once`, `historically` and `since` may have one.",
+        "`held`, `within` and `for` need a limit; `once`, `historically` and `since` may have one. It is a number or a "
+        "declared constant.",
         "guarantee(held(in.level > 3) -> out.status == high)",
     ),
     Code(

@@ -23,7 +23,7 @@ from avow.formulas.temporal.clock import pace_of
 from avow.formulas.values import Data, FunctionValue, Opaque, Value
 from avow.language import sorts as s
 from avow.language.contract import Node, Port
-from avow.language.terms import Literal, Variable
+from avow.language.terms import Variable
 from avow.system.names import ports_named
 from avow.system.plan import STEP_LENGTH, Scenario
 
@@ -55,7 +55,7 @@ class World:
         """The possible times between steps, in seconds: those of ``scenario.domains.dt`` or, without it, the nodes' own
         and half of these. Raises CannotRun."""
         paces = [pace for node in self.frame.system.contract.nodes if (pace := pace_of(node)) is not None]
-        limits = [(p.relation, Fraction(p.amount.value)) for p in paces if isinstance(p.amount, Literal)]
+        limits = [(p.relation, p.number) for p in paces]
         texts = self.scenario.domains.get(STEP_LENGTH)
         if texts is not None:
             tried = [t for text in texts if isinstance(t := self.parse(text, s.REAL), Fraction)]

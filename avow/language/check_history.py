@@ -8,13 +8,14 @@ from fractions import Fraction
 from avow.base.optional import complete
 from avow.base.plain import count
 from avow.language import syntax
+from avow.language.bounds import constant
 from avow.language.check_terms import Terms
-from avow.language.conversions import WHOLE, common, joined, widen
+from avow.language.conversions import WHOLE, common, joined
 from avow.language.lexer import LIMITED, LONG_UNITS, STEPS, UNITS
 from avow.language.printer import show_sort
 from avow.language.sorts import BOOL, NATURAL, REAL, FunctionSort, SetSort
 from avow.language.subterms import timed
-from avow.language.terms import RESPONSES, Arithmetic, History, Limit, Literal, Past, Quantifier, Role, Term, Variable
+from avow.language.terms import RESPONSES, History, Limit, Literal, Past, Quantifier, Role, Term, Variable
 
 _ALWAYS_LIMITED = (Past.HELD, Past.WITHIN, Past.FOR)
 _PLACE = "a response stands as the whole right side of a clause's outermost `->`, or is the clause"
@@ -188,7 +189,7 @@ class Histories(Terms):
                 message = f"a number of steps is a whole number, and this is of type {show_sort(term.sort)}"
                 self.error("RCL303", message, amount)
                 return None
-            return Limit(tree.relation, term, True)
+            return self._constant(tree, term, True)
         if inner.start in self.reports.odd:
             return None  # reported by the lexer
         if not unit and isinstance(inner, syntax.Number):
@@ -207,12 +208,19 @@ class Histories(Terms):
             message = f"a limit without a unit is a REAL, in seconds, and this is of type {show_sort(term.sort)}"
             self.error("RCL320", message, tree, hint="write `[… steps]` or `[… s]`")
             return None
-        seconds = widen(term)
-        if isinstance(seconds, Literal) and not isinstance(seconds.value, bool | str):
-            seconds = Literal(Fraction(seconds.value) * scale, REAL, seconds.span)
-        elif scale != 1:
-            seconds = Arithmetic("*", seconds, Literal(scale, REAL), REAL, seconds.span)
-        return Limit(tree.relation, seconds, False)
+        return self._constant(tree, term, False, scale)
+
+    def _constant(
+        self, tree: syntax.LimitSyntax, term: Term, steps: bool, scale: Fraction = Fraction(1)
+    ) -> Limit | None:
+        number = constant(term)
+        if number is None or number < 0:
+            message = f"a limit is the same at every step and not negative, and `{self.text(tree.amount)}` is not"
+            hint = "write a number or a declared constant; to choose between limits, write a clause for each"
+            self.error("RCL323", message, tree.amount, hint=hint)
+            return None
+        amount = Literal(int(number), NATURAL, term.span) if steps else Literal(number * scale, REAL, term.span)
+        return Limit(tree.relation, amount, steps)
 
 
 def _right_side(tree: syntax.TermSyntax) -> syntax.TermSyntax:

@@ -170,9 +170,9 @@ class _Printer:
 
     def history(self, term: t.History) -> tuple[str, int]:
         """``once[5 steps](F)``, ``F since G``; in words if the style has some."""
-        if term.operator is t.Past.STEPS and term.limit is not None and isinstance(term.limit.amount, t.Literal):
+        if term.operator is t.Past.STEPS and term.limit is not None:
             told = {"==": "every", "<=": "at most"}[term.limit.relation]
-            length = f"{told} {show_number(Fraction(term.limit.amount.value))[0]} s"
+            length = f"{told} {show_number(term.limit.number)[0]} s"
             said = self.style.phrases.get(t.Past.STEPS, f"{self.style.past(t.Past.STEPS)}({{limit}})")
             return said.replace("{limit}", length), ATOM
         limit = "" if term.limit is None else self.limit(term.limit)
@@ -193,14 +193,7 @@ class _Printer:
 
     def limit(self, limit: t.Limit) -> str:
         relation = self.style.words[limit.relation].strip() + " " if limit.relation else ""
-        amount = limit.amount
-        if limit.steps:
-            shown = f"{self.show(amount, SUM)} steps"
-        elif isinstance(amount, t.Literal):
-            shown = f"{show_number(Fraction(amount.value))[0]} s"
-        else:
-            shown = self.show(amount, SUM)
-        return self.style.limit(f"{relation}{shown}")
+        return self.style.limit(f"{relation}{show_number(limit.number)[0]} {'steps' if limit.steps else 's'}")
 
     def variable(self, term: t.Variable) -> str:
         """``in.r``; for another node, ``sensor.r`` (in RCL ``sensor.in.r``, which is never ambiguous)."""

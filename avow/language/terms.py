@@ -379,8 +379,13 @@ class Limit:
     operator determines it."""
 
     relation: str
-    amount: Term
+    amount: Literal
     steps: bool
+
+    @property
+    def number(self) -> Fraction:
+        assert not isinstance(self.amount.value, str)
+        return Fraction(self.amount.value)
 
 
 @dataclass(frozen=True, slots=True)
@@ -400,10 +405,7 @@ class History(_Node):
         return self.arguments if self.limit is None else (*self.arguments, self.limit.amount)
 
     def rebuild(self, parts: tuple[Term, ...]) -> Term:
-        if self.limit is None:
-            return History(self.operator, parts, self.sort, None, self.span)
-        limit = Limit(self.limit.relation, parts[-1], self.limit.steps)
-        return History(self.operator, parts[:-1], self.sort, limit, self.span)
+        return History(self.operator, parts[: len(self.arguments)], self.sort, self.limit, self.span)
 
 
 Term = (

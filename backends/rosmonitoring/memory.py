@@ -27,7 +27,7 @@ from avow.language.contract import Clause, ClauseKind
 from avow.language.printer import show_term
 from avow.language.sorts import BOOL, INTEGER, NATURAL, REAL
 from avow.language.subterms import histories, subterms, timed
-from avow.language.terms import Apply, History, Implies, Literal, Past, Quantified, Role, Term, Variable
+from avow.language.terms import Apply, History, Implies, Past, Quantified, Role, Term, Variable
 
 from .options import Setup
 from .pace import Leeway
@@ -321,8 +321,7 @@ def watch(clause: Clause, tally: Tally, setup: Setup) -> Watched:
                 formula = positions.now
                 compiled = {side: compile_term(held) for side, held in holds.items()}
                 moved = tuple(map(_moments, breaks))
-                period = clause.pace.amount if clause.pace is not None and clause.pace.relation == "==" else None
-                every = Fraction(period.value) if isinstance(period, Literal) else None
+                every = clause.pace.number if clause.pace is not None and clause.pace.relation == "==" else None
                 silence = Silence(compiled, moved, every, setup.leeway)
             else:
                 formula = records.clause(formula)

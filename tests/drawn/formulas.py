@@ -362,12 +362,7 @@ class Formulas:
         choice, numbers = self.random.choice, [name for name, t in names.items() if t == NATURAL]
 
         def limit(relation: str = "") -> str:
-            if self.knobs.seconds:
-                reals = [name for name, t in names.items() if t == REAL]
-                amount = choice(reals) if reals and self.random.random() < 0.15 else str(self.random.randrange(4))
-                return f"[{relation}{amount} s]"
-            amount = choice(numbers) if numbers and self.random.random() < 0.15 else str(self.random.randrange(4))
-            return f"[{relation}{amount} steps]"
+            return f"[{relation}{self.random.randrange(4)} {'s' if self.knobs.seconds else 'steps'}]"
 
         def perhaps(chance: float, relation: str = "") -> str:
             return limit(relation) if self.random.random() < chance else ""

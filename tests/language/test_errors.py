@@ -99,11 +99,19 @@ def test_codes_without_example_are_few() -> None:
         ("stat == red && TRUE", r"RCL101 .*\[write `and`\]"),
         ("∀ stat", "RCL101"),
         ("stat == réd", "RCL107"),
+        ("rose(in.both) -> within[in.k steps](stat == red)", r"RCL323 .* `in.k` is not \[write a number or a declared"),
+        ("once[in.r](in.both)", "RCL323"),
+        ("forall(i in NATURAL | held[i steps](in.both))", "RCL323"),
+        ("in.both since[< (Limit - 4) s] stat == red", "RCL323 .*not negative, and `.Limit - 4.` is not"),
     ],
 )
 def test_messages(formula: str, message: str) -> None:
     found = errors(FRAME % formula)
     assert any(re.search(message, line) for line in found), found
+
+
+def test_a_limit_may_be_computed_from_constants() -> None:
+    assert errors(FRAME % "rose(in.both) -> within[(2 * Limit - 1) steps](once[Limit / 2](in.both))") == []
 
 
 @pytest.mark.parametrize("number", ["1500", "1.5", "-2", "0"])

@@ -15,7 +15,7 @@ from avow.evaluation.running import Keeper
 from avow.formulas.temporal import ages, clock
 from avow.formulas.temporal.ages import CLOCK, ELAPSED, Lasting, Side
 from avow.formulas.temporal.cell import Unsaid
-from avow.formulas.temporal.clock import Timed
+from avow.formulas.temporal.clock import Timed, longest_limit
 from avow.formulas.values import Value
 from avow.language.load import parse_formula
 from avow.language.printer import show_term
@@ -63,7 +63,7 @@ def disagreement(rng: random.Random, depth: int) -> str | None:
     for whole in (term, Implies(trigger, response)):
         if timed(whole) is None:
             continue
-        records = Timed()
+        records = Timed(longest=longest_limit([whole]))
         try:
             clause = records.clause(whole)
             positions = records.positions(whole)
@@ -102,7 +102,7 @@ def test_cells_are_what_the_definitions_say(seed: int) -> None:
 def test_what_a_step_has_had_is_not_demanded_again_right_after_it() -> None:
     """Where the trigger is so for that instant alone."""
     text = "(once[1 s](in.a) and not in.a) -> within[0 s](arrived(in.a))"
-    records = Timed()
+    records = Timed(longest=Fraction(1))
     whole = parse_formula(text, TIMED_NODE, remembers=True, clause=True)
     clause, positions = records.clause(whole), records.positions(whole)
     for seed in (11, 24, 35, 39):

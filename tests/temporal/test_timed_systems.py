@@ -18,7 +18,7 @@ from avow.evaluation.running import Keeper
 from avow.formulas.formula import free_variables, substitute
 from avow.formulas.temporal.ages import CLOCK
 from avow.formulas.temporal.cell import Unsaid
-from avow.formulas.temporal.clock import Timed, one_step
+from avow.formulas.temporal.clock import Timed, longest_limit, one_step
 from avow.formulas.values import Value
 from avow.language.load import check_text
 from avow.language.sorts import REAL
@@ -115,7 +115,7 @@ class EachSecond:
     definitions."""
 
     def __init__(self, term: Term) -> None:
-        records = Timed()
+        records = Timed(longest=longest_limit([term]))
         self.judge, self.keeper = compile_term(records.clause(term)), Keeper(records.cells)
         self.begins = tuple(self.keeper.memory.items())
 

@@ -75,7 +75,7 @@ class Kind(StrEnum):
     EVER = "ever"
 
 
-NO_TIME: t.Term = t.Literal(Fraction(0), REAL)
+NO_TIME = t.Literal(Fraction(0), REAL)
 NONE: t.Term = t.Literal(Fraction(-1), REAL)
 
 
@@ -86,7 +86,7 @@ class Record:
 
     begun: Callable[[Lasting, Instant], t.Term]
     """The condition that there is a silence before a step, and a formula is true at an instant of it."""
-    longest: Fraction | None
+    longest: Fraction
     """Timer values above this are not distinguished."""
     kind: Kind
     holds: Lasting | None
@@ -96,9 +96,7 @@ class Record:
     breaks: tuple[t.Term, ...]
     """In ascending order."""
     relation: str
-    limit: t.Term
-    limit_in_silence: Callable[[Instant], t.Term]
-    most: Fraction | None
+    limit: t.Literal
     left: t.Term = t.FALSE
     """The state that the previous step left."""
 
@@ -117,12 +115,11 @@ class Record:
         holds, began = self._there(instant)
         if self.kind is Kind.EVER:
             return disjunction((began, conjunction((holds, kept))))
-        limit = self.limit_in_silence(instant)
         counts = conjunction((holds, t.Compare("<=", NO_TIME, kept)))
-        old = conjunction((counts, t.Compare(sided(self.relation, instant.side), kept, limit)))
-        fresh = conjunction((began, t.Compare(self.relation, NO_TIME, limit)))
+        old = conjunction((counts, t.Compare(sided(self.relation, instant.side), kept, self.limit)))
+        fresh = conjunction((began, t.Compare(self.relation, NO_TIME, self.limit)))
         if self.kind is Kind.EARLIEST and instant.side is Side.AFTER:  # begins here, and grows while it holds
-            at_once = conjunction((began, holds, t.Compare(sided(self.relation, Side.AFTER), NO_TIME, limit)))
+            at_once = conjunction((began, holds, t.Compare(sided(self.relation, Side.AFTER), NO_TIME, self.limit)))
             fresh = disjunction((fresh, at_once)) if at_once != fresh else fresh
         if self.kind is Kind.LATEST:
             return disjunction((fresh, conjunction((negation(began), old))))
@@ -139,7 +136,7 @@ class Record:
             case Kind.EARLIEST:
                 if self.holds is self.began:
                     return Trend.RISES if began in (Trend.STAYS, Trend.RISES) else Trend.CHANGES
-                long = self.most is not None and (self.most > 0 or (self.most == 0 and self.relation == ">"))
+                long = self.limit != NO_TIME or self.relation == ">"
                 rises = holds is Trend.STAYS and (long or began in (Trend.STAYS, Trend.RISES))
                 return Trend.RISES if rises else Trend.CHANGES
             case Kind.EVER:
@@ -155,7 +152,8 @@ class Record:
         once = self._changing_once(end)
         if once is not None:
             return choice(t.Compare("<", NO_TIME, end), once, self.left)
-        kept, start = self.left, NO_TIME
+        kept = self.left
+        start: t.Term = NO_TIME
         for at in self.breaks:
             here = within(start, at, end)
             kept = self._interval(kept, start, here)
@@ -235,15 +233,11 @@ class Record:
         older = t.Arithmetic("+", kept, length, REAL)
         if self.kind is Kind.EARLIEST:
             return self._at_most(older)
-        young = [t.Compare("<=", NO_TIME, kept)]
-        if self.longest is not None:
-            young.append(t.Compare("<=", kept, t.Literal(self.longest, REAL)))
+        young = (t.Compare("<=", NO_TIME, kept), t.Compare("<=", kept, t.Literal(self.longest, REAL)))
         return choice(conjunction(young), older, NONE)
 
     def _at_most(self, age: t.Term) -> t.Term:
-        """The timer, which does not grow beyond a limit that is a literal."""
-        if self.longest is None:
-            return age
+        """The timer, which does not grow beyond the longest limit."""
         return t.Operation(t.Builtin.MIN, (age, t.Literal(self.longest + 1, REAL)), REAL)
 
     def _point(self, kept: t.Term, holds: t.Term, began: t.Term) -> t.Term:

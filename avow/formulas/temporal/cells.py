@@ -153,36 +153,31 @@ class Records:
             case _:
                 assert_never(term.operator)
 
-    def _amount(self, term: t.History) -> t.Term | None:
+    def _amount(self, term: t.History) -> t.Literal | None:
         if term.limit is None:
             return None
         if not term.limit.steps:
             raise Unsaid(f"`{term.operator}` with a limit in seconds", term.span)
-        return self.term(term.limit.amount)
+        return term.limit.amount
 
-    def _latest(self, term: t.History, holds: t.Term, began: t.Term, relation: str, amount: t.Term) -> t.Term:
+    def _latest(self, term: t.History, holds: t.Term, began: t.Term, relation: str, amount: t.Literal) -> t.Term:
         """``holds since[<= amount] began``: the cell counts the steps since the latest beginning, -1 for none. A
-        beginning older than a literal limit counts as none."""
-        most = written(amount)
+        beginning older than the limit counts as none."""
 
         def age(before: t.Term) -> t.Term:
-            young = [t.Compare("<=", _ZERO, before)]
-            if most is not None:
-                young.append(t.Compare("<", before, t.Literal(most, INTEGER)))
+            young = (t.Compare("<=", _ZERO, before), t.Compare("<", before, t.Literal(amount.value, INTEGER)))
             return _if(began, _ZERO, _if(conjunction((holds, *young)), _plus_one(before), _NONE))
 
         found = self._kept(term, INTEGER, _NONE, age)
         return conjunction((t.Compare("<=", _ZERO, found), t.Compare(relation, found, amount)))
 
-    def _earliest(self, term: t.History, holds: t.Term, began: t.Term, relation: str, amount: t.Term) -> t.Term:
+    def _earliest(self, term: t.History, holds: t.Term, began: t.Term, relation: str, amount: t.Literal) -> t.Term:
         """``holds since[>= amount] began``: the cell counts the steps since the earliest beginning, -1 for none. It
-        stops growing beyond a literal limit."""
-        most = written(amount)
+        stops growing beyond the limit."""
 
         def age(before: t.Term) -> t.Term:
-            older = _plus_one(before)
-            if most is not None:
-                older = t.Operation(t.Builtin.MIN, (older, t.Literal(max(most + 1, 0), INTEGER)), INTEGER)
+            most = t.Literal(int(amount.value) + 1, INTEGER)
+            older = t.Operation(t.Builtin.MIN, (_plus_one(before), most), INTEGER)
             return _if(conjunction((holds, t.Compare("<=", _ZERO, before))), older, _if(began, _ZERO, _NONE))
 
         found = self._kept(term, INTEGER, _NONE, age)
@@ -223,16 +218,10 @@ class Records:
         return cell
 
 
-def written(amount: t.Term) -> int | None:
-    """The number of steps if it is a literal; otherwise None."""
-    value = amount.value if isinstance(amount, t.Literal) else None
-    return value if isinstance(value, int) and not isinstance(value, bool) else None
-
-
 def longest_limits(formulas: Iterable[t.Term]) -> int:
-    """The largest sum of the literal step limits in one formula."""
+    """The largest sum of the limits in steps in one formula."""
     totals = (
-        sum(max(0, written(h.limit.amount) or 0) for h in histories(formula) if h.limit is not None)
+        sum(int(h.limit.number) for h in histories(formula) if h.limit is not None and h.limit.steps)
         for formula in formulas
     )
     return max(totals, default=0)

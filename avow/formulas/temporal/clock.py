@@ -46,12 +46,10 @@ GOES_ON = t.Compare("<", NO_TIME, CLOCK)
 """Time passes from step to step."""
 
 
-def longest_limit(formulas: Iterable[t.Term]) -> Fraction | None:
-    """The longest limit in seconds; None if there is none or one is not a literal."""
+def longest_limit(formulas: Iterable[t.Term]) -> Fraction:
+    """The longest limit in seconds; 0 if there is none."""
     limits = [h.limit for formula in formulas for h in histories(formula) if h.limit is not None]
-    seconds = [limit.amount for limit in limits if not limit.steps]
-    known = [Fraction(a.value) for a in seconds if isinstance(a, t.Literal) and not isinstance(a.value, bool | str)]
-    return max(known, default=None) if len(known) == len(seconds) else None
+    return max((limit.number for limit in limits if not limit.steps), default=Fraction(0))
 
 
 def arrival(term: t.History) -> t.Variable:
@@ -96,9 +94,8 @@ def one_step(node: Node) -> Remembering:
 def one_pace(nodes: Iterable[Node]) -> bool:
     """Whether the steps of all these nodes can be the same steps."""
     paces = [pace for node in nodes if (pace := pace_of(node)) is not None]
-    lengths = [(pace.relation, pace.amount.value) for pace in paces if isinstance(pace.amount, t.Literal)]
-    every = {value for relation, value in lengths if relation == "=="}
-    return len(every) <= 1 and all(v <= most for v in every for _, most in lengths)  # type: ignore[operator]
+    every = {pace.number for pace in paces if pace.relation == "=="}
+    return len(every) <= 1 and all(v <= pace.number for v in every for pace in paces)
 
 
 def other_paces(nodes: Sequence[Node]) -> tuple[frozenset[str], str]:
@@ -118,7 +115,7 @@ class Timed(Records):
 
     _positions: dict[str, Lasting] = field(default_factory=dict)
     _in_time: bool = False
-    longest: Fraction | None = None
+    longest: Fraction = field(kw_only=True)
     """Timer values above this are not distinguished."""
     _machines: dict[str, Cell] = field(default_factory=dict)
 
@@ -145,11 +142,8 @@ class Timed(Records):
 
     def instants(self, formula: Lasting) -> tuple[Mapping[Side, t.Term], tuple[t.Term, ...]]:
         """A formula in the silence after a step, over the state that the step left: its values `ELAPSED` seconds after
-        the step, and the times at which it may change. A quantified variable may occur in these times only as an
-        argument of a cell. Raises Unsaid."""
-        for at in formula.breaks:
-            if any(v.role is t.Role.BOUND for v in free_variables(_unapplied(at))):
-                raise Unsaid("limits in seconds that hang on a quantified variable")
+        the step, and the times at which it may change. A quantified variable occurs in these times only as an argument
+        of a cell."""
         found = {side: formula.silent(Instant(ELAPSED, side)) for side in Side}
         begun = t.Compare("<=", ELAPSED, NO_TIME)  # right after the step, whose instant is not in the silence
         found[Side.AFTER] = t.Conditional(begun, formula.silent(Instant(NO_TIME, Side.AFTER)), found[Side.AFTER], BOOL)
@@ -245,20 +239,10 @@ class Timed(Records):
         inner = tuple(dict.fromkeys((*(_closed(holds) if holds is not None else ()), *_closed(began))))
         if len(inner) > LIMITS_NESTED:
             raise Unsaid(f"`{term.operator}` of what has more than {LIMITS_NESTED} limits in seconds", term.span)
-        relation, amount, most = self._seconds(term)
-        record = Record(
-            self.begun,
-            self.longest,
-            kind,
-            holds,
-            began,
-            _inside(term),
-            _sorted(inner),
-            relation,
-            amount.now,
-            amount.silent,
-            most,
-        )
+        limit = NO_TIME if term.limit is None else term.limit.amount
+        named = "" if term.limit is None else term.limit.relation
+        relation = named or (">=" if term.operator is t.Past.HELD else "<=")
+        record = Record(self.begun, self.longest, kind, holds, began, _inside(term), _sorted(inner), relation, limit)
         cell = self._kept_for(record)
         record.left = cell.read
         _small(cell.now, term)
@@ -270,8 +254,7 @@ class Timed(Records):
                 gone_on = conjunction(((t.TRUE if holds is None else holds.last) or t.FALSE, cell.now))
                 return self._constant(cell.now, disjunction((began.last, gone_on)))
             return Lasting(cell.now, record.silent, None, inner, record.trend)
-        now = conjunction((t.Compare("<=", NO_TIME, cell.now), t.Compare(relation, cell.now, amount.now)))
-        limit = amount.silent(Instant(NO_TIME, Side.AFTER))
+        now = conjunction((t.Compare("<=", NO_TIME, cell.now), t.Compare(relation, cell.now, limit)))
         breaks: list[t.Term] = [t.Arithmetic("-", limit, cell.read, REAL)]
         if not constant or (kind is Kind.EARLIEST and began.last not in (began.now, t.FALSE)):
             breaks += [*inner, limit, *(t.Arithmetic("+", at, limit, REAL) for at in inner)]
@@ -291,18 +274,6 @@ class Timed(Records):
             self._machines[name] = replace(cell, now=record.step(cell.read))
             self.cells.append(self._machines[name])
         return self._machines[name]
-
-    def _seconds(self, term: t.History) -> tuple[str, Lasting, Fraction | None]:
-        """The limit: the relation of a timer to it, its length, and the length if it is a literal."""
-        if term.limit is None:
-            return "", self._constant(NO_TIME, NO_TIME), None
-        amount = self.over(term.limit.amount)
-        if amount.last is None:
-            raise Unsaid("a limit that changes between steps", term.span)
-        value = amount.now.value if isinstance(amount.now, t.Literal) else None
-        most = Fraction(value) if value is not None and not isinstance(value, bool | str) else None
-        relation = term.limit.relation or (">=" if term.operator is t.Past.HELD else "<=")
-        return relation, amount, most
 
     # -- what a silence is like ----------------------------------------------------------------------------------------
 
@@ -390,13 +361,6 @@ def _closed(formula: Lasting) -> tuple[t.Term, ...]:
         if any(v.role is t.Role.BOUND and v not in own for v in free_variables(at)):
             raise Unsaid("limits in seconds under a quantifier, inside another")
     return formula.breaks
-
-
-def _unapplied(term: t.Term) -> t.Term:
-    """The term with each application of a cell that is a function replaced by the function."""
-    if isinstance(term, t.Apply) and isinstance(term.function, t.Variable) and term.function.name.find(CELL) >= 0:
-        return term.function
-    return term.rebuild(tuple(map(_unapplied, term.children))) if term.children else term
 
 
 def _sorted(breaks: tuple[t.Term, ...]) -> tuple[t.Term, ...]:
