@@ -94,10 +94,10 @@ def file_text(path: Path, absent: str, wrong: str, most: int) -> str:
 
 def told(job: Job, diagnostics: Sequence[Diagnostic], most: int = 5) -> str:
     """Diagnostics in one line, for an outcome's summary, with places that are the same on every machine."""
-    said = [_line(job, d) for d in diagnostics[:most]]
+    lines = [_line(job, d) for d in diagnostics[:most]]
     if len(diagnostics) > most:
-        said.append(f"and {len(diagnostics) - most} more")
-    return "; ".join(said)
+        lines.append(f"and {len(diagnostics) - most} more")
+    return "; ".join(lines)
 
 
 def _line(job: Job, diagnostic: Diagnostic) -> str:

@@ -164,7 +164,7 @@ def _held(job: Job, claim: Obligation, steps: Sequence[Step], why: str) -> Outco
         return replace(unknown, summary="; ".join(others))
     if not steps:
         return unknown
-    told, rounded, unsaid = [], 0, 0
+    compared_with, rounded, unsaid = [], 0, 0
     agrees: dict[str, list[str]] = {}
     for method in models(job.system, job.node.name):
         try:
@@ -175,23 +175,23 @@ def _held(job: Job, claim: Obligation, steps: Sequence[Step], why: str) -> Outco
             return replace(unknown, summary=f"the model of {method.id} cannot be run: {error}"[:300])
         compared, outputs = 0, set[str]()
         for step in steps:
-            said = _said(run, step)
-            both = [name for name in said or () if name in step]
-            if said is None or not both:
+            answers = _said(run, step)
+            both = [name for name in answers or () if name in step]
+            if answers is None or not both:
                 unsaid += 1
                 continue
             compared += 1
             outputs.update(both)
-            differing = [name for name in both if not _same(said[name], step[name])]
+            differing = [name for name in both if not _same(answers[name], step[name])]
             if differing:
-                return _differs(claim, method, step, said, differing)
-            rounded += any(said[name] != step[name] for name in both)
+                return _differs(claim, method, step, answers, differing)
+            rounded += any(answers[name] != step[name] for name in both)
         if not compared:
             return replace(unknown, summary=f"the model of {method.id} answers none of {len(steps)} steps")
-        told.append(f"{method.id} on {compared}")
+        compared_with.append(f"{method.id} on {compared}")
         about = {c.name: {v.qualified for v in ports_of(c.formula)} for c in job.node.guarantees}
         agrees[method.id] = [name for name, ports in about.items() if {p for p in ports if p[:4] == "out."} <= outputs]
-    text = f"the program answers as the model of {', '.join(told)} steps"
+    text = f"the program answers as the model of {', '.join(compared_with)} steps"
     but = (f"in {rounded} of them but for rounding",) if rounded else ()
     bound: dict[str, object] = {"cases": len(steps), "rounded": rounded, "unanswered": unsaid}
     return Outcome(claim.id, Verdict.TESTED, "; ".join((text, *but)), None, (*but, *others), bound, {AGREES: agrees})
@@ -214,8 +214,8 @@ def _same(one: Value, other: Value) -> bool:
     return one == other
 
 
-def _differs(claim: Obligation, method: Method, step: Step, said: Step, names: Iterable[str]) -> Outcome:
-    model = tuple((f"model's {name}", show(said[name])) for name in names)
+def _differs(claim: Obligation, method: Method, step: Step, answers: Step, names: Iterable[str]) -> Outcome:
+    model = tuple((f"model's {name}", show(answers[name])) for name in names)
     why = f"the program and the model of {method.id} differ: what is verified of the model is not verified of it"
     shown = Counterexample((*((n, show(v)) for n, v in step.items()), *model), why)
     return Outcome(claim.id, Verdict.REFUTED, shown.text(), shown)

@@ -53,10 +53,10 @@ def check(tool: Backend, job: Job) -> Iterator[Diagnostic]:
 
 def translate(tool: Backend, notation: str, system: System, node: Node) -> Translated:
     """`Backend.translate`, for the clauses that the backend can express. Raises Rejected if the input is at fault."""
-    told = {clause.name: _refusal(tool, node, clause) for clause in node.guarantees}
+    reasons = {clause.name: _refusal(tool, node, clause) for clause in node.guarantees}
     missing = tuple(
         Diagnostic("BACKEND006", why, node.clause(name).span, Severity.WARNING)
-        for name, why in told.items()
+        for name, why in reasons.items()
         if why is not None
     )
     if missing and len(missing) == len(node.guarantees):
@@ -70,8 +70,8 @@ def _sayable(tool: Backend, job: Job) -> tuple[Job, Mapping[str, str]]:
     """The job without the guarantees that the backend cannot express, and the reasons, by obligation."""
     if tool.remembers and tool.answers_itself(job):
         return job, {}
-    told = {o.id: _refusal(tool, job.node, job.clause(o)) for o in job.obligations}
-    refused = {name: why for name, why in told.items() if why is not None}
+    reasons = {o.id: _refusal(tool, job.node, job.clause(o)) for o in job.obligations}
+    refused = {name: why for name, why in reasons.items() if why is not None}
     left = tuple(o for o in job.obligations if o.id not in refused)
     if tool.remembers or not any(histories(c.formula) for node in job.contract.nodes for c in node.clauses):
         return (replace(job, obligations=left) if refused else job), refused
@@ -81,10 +81,10 @@ def _sayable(tool: Backend, job: Job) -> tuple[Job, Mapping[str, str]]:
 
 def refusal(judge: str, node: Node, clause: Clause) -> str | None:
     """Why a method that judges single steps cannot check a guarantee; None if it can."""
-    said = next(((c, found[0]) for c in (clause, *node.assumptions) if (found := histories(c.formula))), None)
-    if said is None:
+    first = next(((c, found[0]) for c in (clause, *node.assumptions) if (found := histories(c.formula))), None)
+    if first is None:
         return None
-    where, record = said
+    where, record = first
     about = f"{node.name}.{clause.name}" if where is clause else f"{node.name}'s assumption {where.name}"
     return f"{judge} judges single steps and has no `{_shown(record)}`, of which {about} speaks"
 

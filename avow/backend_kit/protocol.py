@@ -267,7 +267,7 @@ def _told(name: str, method: Callable[..., Any]) -> Callable[..., Any]:
     """A backend's method, wrapped so that an exception is reported as the backend's defect."""
 
     @functools.wraps(method)
-    def told(tool: Backend, *arguments: Any, **named: Any) -> Any:
+    def checked(tool: Backend, *arguments: Any, **named: Any) -> Any:
         with asking(tool.name, name):
             made = method(tool, *arguments, **named)
             if name not in _MADE_WHOLE:
@@ -279,7 +279,7 @@ def _told(name: str, method: Callable[..., Any]) -> Callable[..., Any]:
                     raise TypeError(f"{one!r} is no {kind.__name__}")
             return whole
 
-    return told
+    return checked
 
 
 class Backend(ABC):

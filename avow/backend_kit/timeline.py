@@ -201,7 +201,7 @@ def picture(timeline: Timeline, alone: bool = False) -> Markup:
 
 def in_words(timeline: Timeline) -> str:
     """A text alternative with the picture's findings."""
-    told = [
+    counts = [
         f"{lane.name}: {KINDS[kind][1]} {count(sum(m.number for m in found), 'time')}, first at event {found[0].first}"
         + (f" (t = {found[0].time})" if found[0].time else "")
         for lane in timeline.lanes
@@ -210,7 +210,7 @@ def in_words(timeline: Timeline) -> str:
     ]
     part = f"; signals of one event in {timeline.every}, marks of all" if timeline.every > 1 else ""
     whole = f"{timeline.name}, {count(timeline.events, 'event')}{part}"
-    return f"{whole}: {'; '.join(told) or 'no finding'}"
+    return f"{whole}: {'; '.join(counts) or 'no finding'}"
 
 
 def _height(lane: Lane) -> int:
@@ -232,10 +232,10 @@ def _drawn(lane: Lane, top: int, events: int) -> Iterable[str]:
     for mark in lane.marks:
         shape, words = KINDS[mark.kind]
         at = f"event {mark.first}" if mark.first == mark.last else f"events {mark.first} to {mark.last}"
-        told = f"{words}: {at}" + (f" (t = {mark.time})" if mark.time else "")
-        told += f", {count(mark.number, 'time')}" if mark.number > 1 else ""
+        title = f"{words}: {at}" + (f" (t = {mark.time})" if mark.time else "")
+        title += f", {count(mark.number, 'time')}" if mark.number > 1 else ""
         place = f"translate({_x(mark.first, events):.1f} {top + 7 if lane.stretches else middle:.1f})"
-        yield f'<path class="mark" transform="{place}" d="{shape}"><title>{_text(told)}</title></path>'
+        yield f'<path class="mark" transform="{place}" d="{shape}"><title>{_text(title)}</title></path>'
 
 
 def _curve(

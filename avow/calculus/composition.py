@@ -267,14 +267,14 @@ class Composition:
         """A node with the environment's inputs and all assumptions about them."""
         if self._surroundings is None:
             flat, contract = self.frame, self.frame.system.contract
-            said = [
+            found = [
                 (a.node, f"environment {a.port}", a.formula) for a in environment_assumptions(flat.system, flat.graph)
             ]
             for name, _ in self.left_to_environment():
-                said.append((name.node, str(name), contract.node(name.node).clause(name.clause).formula))
+                found.append((name.node, str(name), contract.node(name.node).clause(name.clause).formula))
             ports: dict[Variable, None] = {}
             clauses: dict[str, Term] = {}
-            for node, label, formula in sorted(said, key=lambda each: each[1]):  # the order of nodes does not matter
+            for node, label, formula in sorted(found, key=lambda each: each[1]):  # the order of nodes does not matter
                 entries = {
                     v: replace(v, name=flat.entry(node, v.name).removeprefix("in."), span=None)
                     for v in ports_of(formula)
@@ -367,7 +367,7 @@ def composed_over(flat: Frame) -> Composition:
     inside = leaves(system.plan)
     faces = {name: face(system, flat.graph, name, held) for name, held in inside.items()}
     composed: dict[str, Node] = {}
-    said: Said = {}
+    clauses: Said = {}
     goals: dict[str, Goal] = {}
     levels: dict[str, Level] = {}
 
@@ -388,7 +388,7 @@ def composed_over(flat: Frame) -> Composition:
     for name in inner_first(system.plan):
         entry = subsystems[name]
         goal = add(ComposeGoal(name, entry.members, entry.rule, entry.options, entry.span), entry.members, carry=True)
-        composed[name], contract = composed_node(levels.get(name, flat), goal, faces[name], said)
+        composed[name], contract = composed_node(levels.get(name, flat), goal, faces[name], clauses)
         goals[name] = replace(goal, contract=contract)
     for wanted in system.plan.compose:
         members = wanted.select or nodes

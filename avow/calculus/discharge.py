@@ -81,7 +81,7 @@ def settle(
     frame: Frame,
     goal: Goal,
     bounds: Bounds | None = None,
-    told: Told | None = None,
+    report: Told | None = None,
     claims: Mapping[SideCondition, Claim] | None = None,
 ) -> Answers:
     """Check every side condition of a derivation, and judge its loops. For `claims` that are not requested, the earlier
@@ -100,8 +100,8 @@ def settle(
         answer = settled[condition] = solver.condition(condition)
         if kept is not None and mark and answer.verdict is not Verdict.PROVED and not answer.circle:
             kept.now[mark] = NotProved(answer.verdict, answer.used, answer.used_before)
-        if told is not None:
-            told(goal.name, settled[condition])
+        if report is not None:
+            report(goal.name, settled[condition])
     settled = _break_circles(solver, settled)
     if frame.left_out:  # a counterexample need not satisfy the clauses left out
         settled = {

@@ -369,9 +369,9 @@ class Finder:
             solver.set("timeout", CERTIFICATE_NET_MS)
             solver.set("smt.arith.nl.grobner", False)
             solver.from_string("\n".join(lines))
-            said = solver.check(*(z3.Bool(f"track{k}", context) for k in range(len(written))))
-            if said != z3.unsat:
-                if said == z3.unknown and solver.reason_unknown() == "timeout":
+            answer = solver.check(*(z3.Bool(f"track{k}", context) for k in range(len(written))))
+            if answer != z3.unsat:
+                if answer == z3.unknown and solver.reason_unknown() == "timeout":
                     self.solvers.known["\n".join(lines), CERTIFICATE_STEPS] = Said.LATE
                 return None
             needed = {str(switch) for switch in solver.unsat_core()}

@@ -91,11 +91,11 @@ def search(
         solver.add(*(translator.term(constraint, meanings) for constraint in constraints))
         found: list[Values] = []
         while True:
-            said = put(translator, solver, effort, seed)
-            if said.status == "unsat":
+            reply = put(translator, solver, effort, seed)
+            if reply.status == "unsat":
                 return found, True
-            if said.status != "sat":
-                raise CannotRun(f"the solver cannot decide which outputs are allowed: {said.reason}")
+            if reply.status != "sat":
+                raise CannotRun(f"the solver cannot decide which outputs are allowed: {reply.reason}")
             if len(found) >= CHOICES_FOUND:
                 return found, False
             model = solver.model()

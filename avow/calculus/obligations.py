@@ -376,10 +376,10 @@ class _Resting:
         about = frame.required.get(required)
         spoken = [] if about is None else [v.name.rsplit(".", 1) for v in ports_of(about) if "." in v.name]
         marks = {digest for _, digest in established.shown} | {need.digest for need in established.hypotheses}
-        for said in (said for mark in (*marks, established.goal) for said in known.by_digest.get(mark, ())):
-            if said.kind in (Claimed.GUARANTEE, Claimed.ASSUMPTION):
-                formula = frame.system.contract.node(said.node).clause(said.name).formula
-                spoken += [[said.node, v.name] for v in ports_of(formula) if v.role is Role.INPUT]
+        for claim in (claim for mark in (*marks, established.goal) for claim in known.by_digest.get(mark, ())):
+            if claim.kind in (Claimed.GUARANTEE, Claimed.ASSUMPTION):
+                formula = frame.system.contract.node(claim.node).clause(claim.name).formula
+                spoken += [[claim.node, v.name] for v in ports_of(formula) if v.role is Role.INPUT]
         read = {frame.entry(node, port) for node, port in spoken if node in frame.graph.nodes}
         for entry in frame.system.plan.environment:
             if entry.constant and entry.port in read:

@@ -113,10 +113,10 @@ def as_far_as_shown(frame: Frame, answer: Answer) -> Answer:
         return answer
     kept = {key: value for key, value in answer.details.items() if key not in ("would_hold_if", "run")}
     shown = answer.counterexample
-    told = None if shown is None else Counterexample(shown.values, _not_kept_to(frame), shown.trace, shown.loop)
+    broken = None if shown is None else Counterexample(shown.values, _not_kept_to(frame), shown.trace, shown.loop)
     summary = f"{answer.summary.partition('; ')[0]}, but {_not_kept_to(frame)}"
     return replace(
-        answer, verdict=Verdict.UNKNOWN, summary=summary, counterexample=told, details=kept | {"genuine": False}
+        answer, verdict=Verdict.UNKNOWN, summary=summary, counterexample=broken, details=kept | {"genuine": False}
     )
 
 
@@ -210,8 +210,8 @@ def _counterexample(case: Case, condition: SideCondition) -> Counterexample | No
     if found.trace:
         return found
     if case.verdict is not Verdict.REFUTED:
-        told = f"here induction fails, {condition.about} is false, if such a step is reached (@before: one step before)"
-        return Counterexample(found.values, told)
+        text = f"here induction fails, {condition.about} is false, if such a step is reached (@before: one step before)"
+        return Counterexample(found.values, text)
     when = "" if case.phase is Phase.SAME_STEP else f" ({case.phase.value}; @before is the value of the step before)"
     return Counterexample(found.values, f"{condition.about} is false{when}", found.trace, found.loop)
 
@@ -236,8 +236,8 @@ def made_up(answer: Answer, found: Sequence[Established] | None, *, late: bool) 
     """The same as `certified`, for a proof made up of several claims."""
     if found is None:
         return certified(answer, None, late=late)
-    told = {"key": common_key(found), "solvers": min((one.solvers for one in found), default=1)}
-    return replace(answer, details=answer.details | {"certificate": told})
+    certificate = {"key": common_key(found), "solvers": min((one.solvers for one in found), default=1)}
+    return replace(answer, details=answer.details | {"certificate": certificate})
 
 
 def _counted(found: tuple[Verdict, str]) -> Answer:
@@ -266,8 +266,8 @@ class LoopQuestion:
                 parts = (part for part in goal.root.walk() if part.nodes == self.members)
                 about = [str(condition.about) for part in parts for condition in part.side_conditions]
                 found = [composition.certificates.condition(goal, one, bounds) for one in about]
-                told = Answer(Verdict.PROVED, loop.note, details=details)
-                return made_up(told, complete(found), late=composition.certificates.late)
+                proof = Answer(Verdict.PROVED, loop.note, details=details)
+                return made_up(proof, complete(found), late=composition.certificates.late)
             case LoopForm.CIRCULAR:
                 return Answer(Verdict.REFUTED, loop.note, Counterexample(explanation=loop.note), details=details)
             case _ if self.entered:
@@ -306,9 +306,9 @@ class StartQuestion:
                 )
                 if counted[0] is not Verdict.PROVED:
                     return _counted(counted)
-                told = Answer(Verdict.PROVED, f"delayed edges start it: {listed}", details={"initial": list(initials)})
+                proof = Answer(Verdict.PROVED, f"delayed edges start it: {listed}", details={"initial": list(initials)})
                 found = composition.certificates.existence(start_name(self.members))
-                made = made_up(told, found, late=composition.certificates.late)
+                made = made_up(proof, found, late=composition.certificates.late)
                 return replace(made, established=found[0] if found else None)
             case "unsat":
                 summary = f"no values are as the plan says: {', '.join(solution.core)}"

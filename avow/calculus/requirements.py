@@ -68,8 +68,8 @@ class FormulaQuestion:
         """Tries each method briefly first: one may be quick where another never succeeds. A run over the plan's
         scenario that violates the formula is searched for before any long attempt."""
         if self.unsaid:
-            told = f"{self.unsaid}: nothing can be shown of it step by step; a `temporal` property is judged over runs"
-            return Answer(Verdict.UNKNOWN, told)
+            why = f"{self.unsaid}: nothing can be shown of it step by step; a `temporal` property is judged over runs"
+            return Answer(Verdict.UNKNOWN, why)
         answer = as_far_as_shown(composition.frame, self.searched(composition, bounds))
         if not self.required or answer.verdict is not Verdict.PROVED or answer.vacuous:
             return answer
@@ -166,8 +166,8 @@ class FormulaQuestion:
         if not found:
             return answer
         listed = {"would_hold_if": [offer.data(when) for offer in found]}
-        told = would_hold_if(found, f"at {when} " if when else "")
-        return replace(answer, summary=answer.summary + told, details=answer.details | listed)
+        summary = would_hold_if(found, f"at {when} " if when else "")
+        return replace(answer, summary=answer.summary + summary, details=answer.details | listed)
 
     def by_induction(
         self, composition: Composition, everything: tuple[str, ...], goal: Term, bounds: Bounds, patient: bool
@@ -198,17 +198,17 @@ class FormulaQuestion:
             by = (more.by,) if more.by else ()
             return self.proved(composition, (first, kept), Phase.LATER, bounds, more.steps, by)
         if more.run is not None:
-            told = f"a run of {more.steps} steps makes {self.name} false"
+            summary = f"a run of {more.steps} steps makes {self.name} false"
             details: dict[str, object] = {"genuine": True, "run": more.steps}
-            answer = Answer(Verdict.REFUTED, told, more.run, bound={"steps": more.steps}, details=details)
+            answer = Answer(Verdict.REFUTED, summary, more.run, bound={"steps": more.steps}, details=details)
             return self.repaired(frame, goal, answer, itself | before, Phase.LATER.value)
         return self.repaired(frame, goal, self.induction_fails(later), itself | before, Phase.LATER.value)
 
     def induction_fails(self, answer: Entailment) -> Answer:
         """The answer if some step does not preserve the formula and it is unknown whether that step is ever reached."""
         values = answer.counterexample.values if answer.counterexample is not None else ()
-        told = f"here induction fails, {self.name} is false, if such a step is reached (@before: one step before)"
-        shown = Counterexample(values, told)
+        summary = f"here induction fails, {self.name} is false, if such a step is reached (@before: one step before)"
+        shown = Counterexample(values, summary)
         at = ", ".join(f"{name} = {value}" for name, value in values[:6])
         return Answer(
             Verdict.UNKNOWN,
@@ -264,8 +264,8 @@ class FormulaQuestion:
     def not_proved(self, answer: Entailment, when: str = "") -> Answer:
         details: dict[str, object] = {"genuine": True}
         if answer.verdict is Verdict.REFUTED and answer.counterexample is not None:
-            told = f"the contracts allow {self.name} to be false{' ' + when if when else ''}"
-            return Answer(Verdict.REFUTED, told, Counterexample(answer.counterexample.values, told), details=details)
+            text = f"the contracts allow {self.name} to be false{' ' + when if when else ''}"
+            return Answer(Verdict.REFUTED, text, Counterexample(answer.counterexample.values, text), details=details)
         return Answer(Verdict.UNKNOWN, f"the solver gave up: {answer.reason}", details={"genuine": False})
 
 

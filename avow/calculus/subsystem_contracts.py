@@ -124,9 +124,9 @@ Said = dict[ClauseName, Term]
 like, for which the calculus uses cells."""
 
 
-def composed_node(frame: Frame, goal: Goal, face: Face, said: Said) -> tuple[Node, tuple[str, ...]]:
+def composed_node(frame: Frame, goal: Goal, face: Face, formulas: Said) -> tuple[Node, tuple[str, ...]]:
     """The subsystem with its derived contract, and that contract as lines of text. Clauses are named ``camera.sharp``,
-    by the node inside; their cells (``camera.once#…``) are inputs. The clauses as written are added to `said`."""
+    by the node inside; their cells (``camera.once#…``) are inputs. The clauses as written are added to `formulas`."""
     flat = frame.flat if isinstance(frame, Level) else frame
     ports: dict[Variable, Variable] = {}
     for port in (*face.node.outputs, *face.node.inputs):
@@ -148,8 +148,8 @@ def composed_node(frame: Frame, goal: Goal, face: Face, said: Said) -> tuple[Nod
             formula = substitute(term, ports)
             clauses[kind].append(replace(original, kind=kind, name=str(name), position=number, formula=formula))
             used = _carrying(frame, goal, name) if kind is ClauseKind.ASSUMPTION else ()
-            told = _under((_said(frame, name, said) for name in used), _said(frame, name, said))
-            said[ClauseName(face.node.name, str(name))] = told
+            assumption = _under((_said(frame, name, formulas) for name in used), _said(frame, name, formulas))
+            formulas[ClauseName(face.node.name, str(name))] = assumption
     node = replace(
         face.node,
         inputs=(*face.node.inputs, *kept),
@@ -161,16 +161,16 @@ def composed_node(frame: Frame, goal: Goal, face: Face, said: Said) -> tuple[Nod
     lines += [f"  puts out {', '.join(port.name for port in node.outputs)}"] if node.outputs else []
     for verb, these in (("assumes", node.assumptions), ("guarantees", node.guarantees)):
         for clause in these:
-            told = substitute(said[ClauseName(node.name, clause.name)], ports)
-            lines.append(f"  {verb} {clause.name}: {show_term(told)}")
+            formula = substitute(formulas[ClauseName(node.name, clause.name)], ports)
+            lines.append(f"  {verb} {clause.name}: {show_term(formula)}")
     return node, tuple(lines)
 
 
-def _said(frame: Frame, name: ClauseName, said: Said) -> Term:
+def _said(frame: Frame, name: ClauseName, clauses: Said) -> Term:
     """A clause of a node or subsystem as it was written, over the whole system's values; an unwritten one (that time
     advances) in the form that the calculus uses."""
-    if name in said:
-        return said[name]
+    if name in clauses:
+        return clauses[name]
     flat = frame.flat if isinstance(frame, Level) else frame
     node = flat.system.contract.node(name.node)
     written = next((clause.formula for clause in node.clauses if clause.name == name.clause), None)
@@ -225,8 +225,8 @@ def with_persistence(frame: Level, goal: Goal) -> Goal:
         found += [name for held in behind.values() if len(held) > 1 for name in sorted(held)]
     if not found:
         return goal
-    told = PERSISTENCE.format(", ".join(dict.fromkeys(found)))
-    root = replace(goal.root, hypotheses=tuple(dict.fromkeys((*goal.root.hypotheses, told))))
+    hypothesis = PERSISTENCE.format(", ".join(dict.fromkeys(found)))
+    root = replace(goal.root, hypotheses=tuple(dict.fromkeys((*goal.root.hypotheses, hypothesis))))
     return replace(goal, root=root, together=True)
 
 

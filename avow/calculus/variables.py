@@ -382,14 +382,14 @@ def framed(system: System, graph: Graph, assumed: Sequence[Assumed], required: M
     left_out: list[str] = []
     for node in system.contract.nodes:
         own = [a for a in assumed if a.node == node.name]
-        nodes[node.name], cells[node.name], said = _of_one_step(node, own, fresh, paced=node.name not in others)
+        nodes[node.name], cells[node.name], formulas = _of_one_step(node, own, fresh, paced=node.name not in others)
         left_out += [
             f"{node.name}.{g.name}"
             for g in node.guarantees
             if _unsaid(g.formula, nodes[node.name].clause(g.name).formula)
         ]
-        left_out += [a.port for a, one in zip(own, said, strict=True) if _unsaid(a.formula, one.formula)]
-        given += said
+        left_out += [a.port for a, one in zip(own, formulas, strict=True) if _unsaid(a.formula, one.formula)]
+        given += formulas
     given.sort(key=lambda a: [each.port for each in assumed].index(a.port))
     constants = frozenset(entry.port for entry in system.plan.environment if entry.constant)
     observed = {name: observing(name, term, fresh()) for name, term in speaking.items()}
@@ -403,9 +403,9 @@ def framed(system: System, graph: Graph, assumed: Sequence[Assumed], required: M
     return made
 
 
-def _unsaid(clause: Term, said: Term) -> bool:
+def _unsaid(clause: Term, formula: Term) -> bool:
     """Whether a clause with a limit or a count has no formula over one step. (No first steps violate `eventually`.)"""
-    return said == TRUE and (timed(clause) is not None or counts_steps(clause))
+    return formula == TRUE and (timed(clause) is not None or counts_steps(clause))
 
 
 def _of_one_step(
@@ -421,27 +421,27 @@ def _of_one_step(
     read = (*made.before, *events(made))
     ports = tuple(Port(Role.INPUT, v.name, v.sort, show_sort(v.sort)) for v in read)
     # a clause without a formula over one step is no hypothesis; such an assumption of a node stays, and open
-    said = {c.name: TRUE if c.name in made.unsaid else c.formula for c in made.node.clauses}
-    said |= {g.name: TRUE for g in node.guarantees if g.pace is not None and not paced}
-    kept = tuple(replace(g, formula=said[g.name]) for g in made.node.guarantees)
+    formulas = {c.name: TRUE if c.name in made.unsaid else c.formula for c in made.node.clauses}
+    formulas |= {g.name: TRUE for g in node.guarantees if g.pace is not None and not paced}
+    kept = tuple(replace(g, formula=formulas[g.name]) for g in made.node.guarantees)
     known = made.node.assumptions[: len(node.assumptions)]
-    given = [replace(a, formula=said[each.name]) for a, each in zip(assumed, supposed, strict=True)]
+    given = [replace(a, formula=formulas[each.name]) for a, each in zip(assumed, supposed, strict=True)]
     return replace(node, inputs=(*node.inputs, *ports), assumptions=known, guarantees=kept), made.cells, given
 
 
 def observing(name: str, formula: Term, records: Records) -> Observed:
     """A requirement that mentions other steps, as a formula over one step."""
     try:
-        said = records.clause(formula)
+        translated = records.clause(formula)
     except Unsaid as why:
         return Observed(formula, unsaid=why.reason)
     names = {cell.before: replace(cell.before, name=f"{OBSERVED}{name}.{cell.name}") for cell in records.cells}
-    spoken = free_variables(said).union(*(free_variables(cell.now) for cell in records.cells))
+    spoken = free_variables(translated).union(*(free_variables(cell.now) for cell in records.cells))
     for event in (v for v in spoken if is_arrival(v)):
         node, _, port = event.name.removeprefix("arrived ").partition(".")
         names[event] = replace(event, name=f"{node}.arrived {port}")
     cells = (replace(cell, before=names[cell.before], now=substitute(cell.now, names)) for cell in records.cells)
-    return Observed(substitute(said, names), tuple(cells))
+    return Observed(substitute(translated, names), tuple(cells))
 
 
 def system_variable(name: str, sort: Sort, earlier: int = 0) -> Variable:

@@ -99,8 +99,8 @@ def unseal(text: str, trusted: Sequence[Path] = ()) -> Opened | str:
             Ed25519PublicKey.from_public_bytes(raw).verify(signature, _authenticated(payload))
         except (InvalidSignature, ValueError):
             return "its signature is not of this text"
-        told = "a trusted key" if known else "a key that nobody here has named as trusted:"
-        return Opened(statement, f"with {told} {raw.hex()[:16]}…", raw.hex())
+        key_name = "a trusted key" if known else "a key that nobody here has named as trusted:"
+        return Opened(statement, f"with {key_name} {raw.hex()[:16]}…", raw.hex())
     return "no trusted key has signed it"
 
 

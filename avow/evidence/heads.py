@@ -110,15 +110,15 @@ def read_index(path: Path) -> Index:
     previous = GENESIS
     *lines, torn = data.split(b"\n")
     for number, line in enumerate(lines):
-        said = _read(line)
-        if said is None:
+        entry = _read(line)
+        if entry is None:
             damage.append(f"line {number + 1} of the index of ledgers is not as it was written")
             continue
-        if said.n != number or said.prev != previous:
+        if entry.n != number or entry.prev != previous:
             damage.append(f"line {number + 1} of the index of ledgers does not follow the line before it")
-        previous = said.hash
-        found.append(said)
-        marks.append(said.hash)
+        previous = entry.hash
+        found.append(entry)
+        marks.append(entry.hash)
     if torn and not torn.startswith(b'{"event":'):  # else a run was killed while writing it: the next one repairs it
         damage.append("there is something behind the last line of the index of ledgers")
     return Index(tuple(found), tuple(marks), tuple(damage), True)
@@ -145,19 +145,19 @@ def _is_newest(index: Index, event: Event, system: str, records: int, head: str)
     return bool(newest) and (newest[0].event, newest[0].records, newest[0].head) == (event, records, head)
 
 
-def _written(said: Line) -> bytes:
+def _written(entry: Line) -> bytes:
     """The line with its hash."""
-    mark = sha256(canonical(to_json(replace(said, hash=""))))
-    return canonical(to_json(replace(said, hash=mark))).encode()
+    mark = sha256(canonical(to_json(replace(entry, hash=""))))
+    return canonical(to_json(replace(entry, hash=mark))).encode()
 
 
 def _read(line: bytes) -> Line | None:
     """None for a line that differs from what was written."""
     try:
-        said = from_text(Line, line)
+        entry = from_text(Line, line)
     except Unreadable:
         return None
-    return said if _written(said) == line else None
+    return entry if _written(entry) == line else None
 
 
 # -- the head as other files state it -------------------------------------------------------------------------------

@@ -233,9 +233,9 @@ class Ledger:
 
     def _remembered(self, data: bytes) -> int:
         """The number of a ledger's bytes that were read before and found without damage."""
-        said = read_note(_Known, self._note) if self._remembers and not self._offset else None
-        known = said is not None and said.bytes <= len(data) and sha256(data[: said.bytes]) == said.sha256
-        return said.bytes if said is not None and known else 0
+        note = read_note(_Known, self._note) if self._remembers and not self._offset else None
+        known = note is not None and note.bytes <= len(data) and sha256(data[: note.bytes]) == note.sha256
+        return note.bytes if note is not None and known else 0
 
     def _mend(self, file: int) -> None:
         """Move a torn last line (a run was killed while writing it) aside, so that the chain continues after the line

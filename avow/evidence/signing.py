@@ -92,12 +92,12 @@ def verify_signature(path: Path, chain: Signed, public: Path | None) -> tuple[st
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PublicKey
 
     try:
-        said = from_text(Signature, read_regular(path))
-        signature, own = bytes.fromhex(said.signature), bytes.fromhex(said.public_key)
+        stated = from_text(Signature, read_regular(path))
+        signature, own = bytes.fromhex(stated.signature), bytes.fromhex(stated.public_key)
         key = public_key(public) if public is not None else Ed25519PublicKey.from_public_bytes(own)
     except (OSError, ValueError) as error:
         return f"{path.name} cannot be read as a signature: {error}", 0
-    head, count = said.hash, said.records
+    head, count = stated.hash, stated.records
     try:
         key.verify(signature, _message(chain.name, head, count))
     except InvalidSignature:

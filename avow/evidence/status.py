@@ -135,8 +135,8 @@ def _effective(verdict: Verdict, strength: Verdict) -> Verdict:
 
 
 @cache
-def _weight(told: Verdict, strength: Verdict, vacuous: bool) -> Weight:
-    verdict = _effective(told, strength)
+def _weight(reported: Verdict, strength: Verdict, vacuous: bool) -> Weight:
+    verdict = _effective(reported, strength)
     if verdict is Verdict.REFUTED:
         return Weight(refuted=True)
     if not verdict.supports:

@@ -98,12 +98,12 @@ def interpretation(node: Node, scenario: Scenario | None) -> dict[Variable, Valu
 
 def rows_of(node: Node, port: Port, sorts: Sequence[Sort], scenario: Scenario) -> list[tuple[Value, ...]] | None:
     """The rows of the table that interprets a port; None if there is no table with such columns."""
-    said = scenario.interpreted(node.name, port)
-    if said is None or len(said[1]) != len(sorts):
+    interpretation = scenario.interpreted(node.name, port)
+    if interpretation is None or len(interpretation[1]) != len(sorts):
         return None
     try:
-        table = scenario.table(said[0])
-        cells = [[_value(t, s) for t in table.column(c)] for c, s in zip(said[1], sorts, strict=True)]
+        table = scenario.table(interpretation[0])
+        cells = [[_value(t, s) for t in table.column(c)] for c, s in zip(interpretation[1], sorts, strict=True)]
     except (KeyError, ValueError):
         return None
     return list(zip(*cells, strict=True))

@@ -60,11 +60,11 @@ def ask(
         )
     finally:
         process.end_orphans()
-        said = channel.close()
-    if done.code != 0 or said.count(b"\n") != 1 or not said.endswith(b"\n"):
+        output = channel.close()
+    if done.code != 0 or output.count(b"\n") != 1 or not output.endswith(b"\n"):
         return done, None
     try:
-        word = from_text(_Word, said)
+        word = from_text(_Word, output)
         if word.ended:
             process.ended_with(-signal.SIGKILL)
         return done, from_json(kind, word.answer)

@@ -54,11 +54,11 @@ class Outside:
                 what = f"what {os.path.basename(command[0])} reads, which nothing records here ({remedy()})"  # noqa: PTH119
                 self._events["outside", what] = None
             else:
-                told = trace.read_all(program, cwd)
-                if told is None and done.code is not None:
-                    told = (("outside", f"what no trace tells of {command[0]}"),)
+                events = trace.read_all(program, cwd)
+                if events is None and done.code is not None:
+                    events = (("outside", f"what no trace tells of {command[0]}"),)
                 own = tuple(os.path.realpath(place) + os.sep for place in (home, cwd))
-                self._events.update((event, None) for event in _beyond(told or (), own))
+                self._events.update((event, None) for event in _beyond(events or (), own))
         return Completed(tuple(command), done.code, done.stdout, done.stderr, done.seconds)
 
     def observed(self) -> tuple[Observed, ...]:
@@ -67,11 +67,11 @@ class Outside:
         known = {str(file) for place in places for file in program_files(place)}
         within = tuple(f"{folder}{os.sep}" for place in places for folder in program_folders(place))
 
-        def told(event: str, path: str) -> bool:
+        def reported(event: str, path: str) -> bool:
             real = os.path.realpath(path)
             return event == "outside" or (real not in known and not f"{real}{os.sep}".startswith(within))
 
-        seen = recorded((event, path) for event, path in list(self._events) if told(event, path))
+        seen = recorded((event, path) for event, path in list(self._events) if reported(event, path))
         return folded(seen)
 
     def _path(self, program: str) -> str:

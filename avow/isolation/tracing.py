@@ -103,8 +103,8 @@ class _Places:
         for process, line in lines:
             if line.startswith((b"chdir(", b"fchdir(")):
                 moved.add(process)
-            elif process not in moved and (said := _FROM.match(line)):
-                self._begins.setdefault(process, _text(said[1]))
+            elif process not in moved and (match := _FROM.match(line)):
+                self._begins.setdefault(process, _text(match[1]))
             elif child := _STARTED.match(line):
                 self._parents.setdefault(int(child[1]), process)
 
@@ -122,8 +122,8 @@ class _Places:
         """Update the process' working folder from the next line."""
         if child := _STARTED.match(line):
             self.of(int(child[1]))
-        elif said := _FROM.match(line):
-            self._now[process] = _text(said[1])
+        elif match := _FROM.match(line):
+            self._now[process] = _text(match[1])
         elif (step := _STEP.match(line)) is not None:
             to = _text(step[1] or step[2])
             at = "" if to[:1] == os.sep else self.of(process)

@@ -91,12 +91,12 @@ class Kernel:
             raise Refused("a requirement rests on what only a derived contract may assume")
         answered = [answer for i in own for answer in answers[i]]
         needed |= {Needed(How.TOGETHER, "", sha256("\n".join(n)), n) for a in answered if (n := a.together)}
-        told = [Format.NOW, entries[goal].digest, *map(astuple, sorted(needed)), sorted({a.digest for a in answered})]
+        parts = [Format.NOW, entries[goal].digest, *map(astuple, sorted(needed)), sorted({a.digest for a in answered})]
         return Established(
             goal=entries[goal].digest,
             hypotheses=tuple(sorted(needed)),
             shown=tuple((entries[i].node, entries[i].digest) for i in sorted(part) if entries[i].how is How.SHOWN),
-            key=sha256(json.dumps(told)),
+            key=sha256(json.dumps(parts)),
             vacuous=any(answer.vacuous for answer in answered),
             solvers=min((answer.solvers for answer in answered), default=1),
             at_once=not apart,
@@ -162,9 +162,9 @@ class Kernel:
             if re.search(r"\((forall|exists) \(", script):  # without quantifiers, one element represents any number
                 raise Refused(f"{otherwise}, however many elements {' and '.join(types)} may have")
             script += "".join(f"(assert (forall ((x {name}) (y {name})) (= x y)))\n" for name in types)
-        said, count = self.solvers.ask(script, wanted)
+        answer, count = self.solvers.ask(script, wanted)
         if not count:
-            raise Refused(f"{otherwise}: {said}")
+            raise Refused(f"{otherwise}: {answer}")
         return Answered(sha256(script), count)
 
     def answered(self, entry: Entry, question: Question, step: int) -> Answered:
@@ -237,8 +237,8 @@ class Kernel:
         before = question.initials or any(back or any(p.back for p in each.sources) for each, back in used)
         reads = {(node, each.node) for each, _ in used for node in each.nodes - {each.node}}
         nodes = {node for each, _ in used for node in each.nodes}
-        said = KINDS[How.ENVIRONMENT]
-        own = {s.node for s, _ in used if s.kind is Claimed.GUARANTEE or (s.kind in said and s.sources)}
+        kinds = KINDS[How.ENVIRONMENT]
+        own = {s.node for s, _ in used if s.kind is Claimed.GUARANTEE or (s.kind in kinds and s.sources)}
         if off := own - nodes - {claim.node}:
             nodes |= off | ({claim.node} - {""})
         joined = any(len(s.nodes - {s.node}) > 1 for s, _ in used) or len(reads) > len(dict(reads))

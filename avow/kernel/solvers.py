@@ -32,8 +32,8 @@ def ask_z3(script: str, budget: int) -> Said:
         solver.set(rlimit=budget, timeout=NET_MS)
         solver.set("smt.arith.nl.grobner", False)  # for non-linear integer terms: they cannot be interrupted
         solver.from_string(script)
-        said = Said(str(solver.check()))
-        return Said.LATE if said is Said.UNKNOWN and solver.reason_unknown() == "timeout" else said
+        answer = Said(str(solver.check()))
+        return Said.LATE if answer is Said.UNKNOWN and solver.reason_unknown() == "timeout" else answer
     except z3.Z3Exception:
         return Said.UNKNOWN
 
@@ -48,10 +48,10 @@ class Solvers:
 
     def ask(self, script: str, wanted: Said) -> tuple[Said, int]:
         """The answer; how many solvers give the wanted one: 0 if Z3 does not, or the second says the opposite."""
-        if (said := self.first(script, BUDGET)) is not wanted or self.second is None:
-            return said, int(said is wanted)
+        if (answer := self.first(script, BUDGET)) is not wanted or self.second is None:
+            return answer, int(answer is wanted)
         second = self.second(script)
-        return (second, 0) if {wanted, second} == {Said.SAT, Said.UNSAT} else (said, 1 + (second is wanted))
+        return (second, 0) if {wanted, second} == {Said.SAT, Said.UNSAT} else (answer, 1 + (second is wanted))
 
     def first(self, script: str, budget: int) -> Said:
         """Z3's answer."""

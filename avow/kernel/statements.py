@@ -117,8 +117,8 @@ class Statements:
 
 
 def statements(wiring: Wiring) -> Statements:
-    clauses = [(Claimed.ASSUMPTION, n.name, said.name, said.formula) for n in wiring.nodes for said in n.assumptions]
-    clauses += [(Claimed.GUARANTEE, n.name, said.name, said.formula) for n in wiring.nodes for said in n.guarantees]
+    clauses = [(Claimed.ASSUMPTION, n.name, one.name, one.formula) for n in wiring.nodes for one in n.assumptions]
+    clauses += [(Claimed.GUARANTEE, n.name, one.name, one.formula) for n in wiring.nodes for one in n.guarantees]
     found, untold = list[Statement](), set[str]()
     for kind, node, name, term in (*clauses, *wiring.formulas):
         try:
@@ -145,5 +145,5 @@ def _stated(wiring: Wiring, kind: Claimed, node: str, name: str, term: Term) -> 
 
     body = (text := Text()).formula(term, called)
     # a claim about some values differs from one about all
-    said = [*text.declarations.values(), *([kind] if kind in (Claimed.POSSIBLE, Claimed.START) else []), body]
-    return Statement(kind, node, name, term, places, sha256("\n".join(said)))
+    parts = [*text.declarations.values(), *([kind] if kind in (Claimed.POSSIBLE, Claimed.START) else []), body]
+    return Statement(kind, node, name, term, places, sha256("\n".join(parts)))

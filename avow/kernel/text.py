@@ -102,8 +102,8 @@ class Text:
     def _datatype(self, name: str, constructors: list[tuple[str, tuple[s.Sort, ...]]]) -> str:
         if name not in self.declarations:
             made = [(field(name, own), [self.sort(p) for p in parameters]) for own, parameters in constructors]
-            told = (f"({c}{''.join(f' ({field(c, k)} {p})' for k, p in enumerate(parts))})" for c, parts in made)
-            self.declarations[name] = f"(declare-datatypes (({name} 0)) (({' '.join(told)})))"
+            written = (f"({c}{''.join(f' ({field(c, k)} {p})' for k, p in enumerate(parts))})" for c, parts in made)
+            self.declarations[name] = f"(declare-datatypes (({name} 0)) (({' '.join(written)})))"
         return name
 
     def member(self, sort: s.Sort, value: str) -> str | None:

@@ -63,12 +63,12 @@ def analyse(
     )
     results = []
     asked = claims(node)
-    told = [k for k, claim in enumerate(asked) if wanted is None or claim.name in wanted]
-    for claim in asked[: max(told, default=-1) + 1]:
+    chosen = [k for k, claim in enumerate(asked) if wanted is None or claim.name in wanted]
+    for claim in asked[: max(chosen, default=-1) + 1]:
         start = time.monotonic()
         finding = analysis.settle(claim)
         results.append(SanityResult.of(node.name, claim, finding, time.monotonic() - start))
-    return tuple(results[k] for k in told)
+    return tuple(results[k] for k in chosen)
 
 
 def outcomes(

@@ -182,7 +182,7 @@ class Difference:
 def difference(node: Node, mutant: Mutant, effort: int = 4_000) -> Difference:
     """The difference between a mutant of one of the node's guarantees and the node's contract; `effort` limits each of
     two queries."""
-    told = Difference(mutant.change, show_term(mutant.formula))
+    shown = Difference(mutant.change, show_term(mutant.formula))
     assumptions = {f"assumed {c.name}": c.formula for c in node.assumptions}
     guarantees = {c.name: c.formula for c in node.guarantees}
     inputs = tuple(port.variable for port in node.inputs)
@@ -193,13 +193,13 @@ def difference(node: Node, mutant: Mutant, effort: int = 4_000) -> Difference:
         found = solve(guarantees, given=kept.inputs, variables=outputs, effort=effort)
         if found.status == "sat":  # otherwise the contract has no output there, so no difference
             concerned = [formula for name, formula in guarantees.items() if name in kept.group]
-            return _shown(told, {**kept.inputs, **found.values}, [mutant.formula, *concerned], forced=True)
+            return _shown(shown, {**kept.inputs, **found.values}, [mutant.formula, *concerned], forced=True)
     answer = entails({**assumptions, **guarantees}, mutant.formula, effort=effort)
-    return _shown(told, answer.values, [mutant.formula]) if answer.verdict is Verdict.REFUTED else told
+    return _shown(shown, answer.values, [mutant.formula]) if answer.verdict is Verdict.REFUTED else shown
 
 
 def _shown(
-    told: Difference, values: Mapping[t.Variable, Value], formulas: list[t.Term], forced: bool = False
+    difference: Difference, values: Mapping[t.Variable, Value], formulas: list[t.Term], forced: bool = False
 ) -> Difference:
     """The difference with the inputs that the formulas mention, and the outputs that the mutant (the first) does."""
     inputs = frozenset[t.Variable]().union(*map(free_variables, formulas))
@@ -209,7 +209,7 @@ def _shown(
         names = {v.qualified for v in spoken if v.role is role}
         return show_values({v: value for v, value in values.items() if v.qualified in names})
 
-    return replace(told, at=of(t.Role.INPUT, inputs), answer=of(t.Role.OUTPUT, outputs), forced=forced)
+    return replace(difference, at=of(t.Role.INPUT, inputs), answer=of(t.Role.OUTPUT, outputs), forced=forced)
 
 
 def _listed(values: tuple[tuple[str, str], ...]) -> str:

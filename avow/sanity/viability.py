@@ -378,8 +378,8 @@ class _Game:
             _, (inputs, answers) = self.lost[memory]
             shown = tuple((name, show(value)) for name, value in inputs.items())
             if not answers:
-                told = f"after these inputs no output meets the guarantees at step {len(steps) + 1}"
-                return Counterexample(shown, told, (*steps, shown))
+                explanation = f"after these inputs no output meets the guarantees at step {len(steps) + 1}"
+                return Counterexample(shown, explanation, (*steps, shown))
             outputs, memory = max(answers, key=lambda answer: self.lost[answer[1]][0])
             steps.append((*shown, *((name, show(value)) for name, value in outputs.items())))
 
@@ -422,9 +422,9 @@ def _defeated(contract: Contract, length: int) -> Viability | None:
         tuple((v.qualified, show(answer.inputs[x])) for v in contract.inputs if (x := at(v, step)) in answer.inputs)
         for step in range(1, length + 1)
     )
-    told = f"{'with these inputs ' if contract.inputs else ''}no outputs meet {' and '.join(clauses)} at "
-    told += "the first step" if length == 1 else f"each of the first {length} steps"
-    return Viability(Verdict.REFUTED, run=Counterexample(run[-1], told, run), clauses=clauses)
+    explanation = f"{'with these inputs ' if contract.inputs else ''}no outputs meet {' and '.join(clauses)} at "
+    explanation += "the first step" if length == 1 else f"each of the first {length} steps"
+    return Viability(Verdict.REFUTED, run=Counterexample(run[-1], explanation, run), clauses=clauses)
 
 
 def steps_of(number: int) -> str:
@@ -458,8 +458,8 @@ def _approached(contract: Contract) -> Viability:
                 return unknown
         following = conjunction((region, found))
         if solve([contract.at_first(following)], effort=contract.effort, values="unused").status == "unsat":
-            told = f"the environment can bring it to where no output meets the guarantees, within {steps_of(number)}"
-            return Viability(Verdict.REFUTED, told, Counterexample(explanation=told))
+            why = f"the environment can bring it to where no output meets the guarantees, within {steps_of(number)}"
+            return Viability(Verdict.REFUTED, why, Counterexample(explanation=why))
         if entails([region], following, effort=contract.effort, seed=contract.seed).verdict is Verdict.PROVED:
             return Viability(Verdict.PROVED) if contract.closed(region) else unknown
         region = following

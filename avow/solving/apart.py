@@ -57,8 +57,8 @@ class Apart:
 
     def _said(self, script: str, limit: int) -> tuple[Said, int]:
         try:
-            said, used = self.ask(script if self.solver == "z3" else f"{script}(check-sat)\n", limit, NET_MS / 1000)
-            return Said(said or Said.UNKNOWN), used
+            answer, used = self.ask(script if self.solver == "z3" else f"{script}(check-sat)\n", limit, NET_MS / 1000)
+            return Said(answer or Said.UNKNOWN), used
         except TimeoutError:
             return Said.LATE, limit
         except NoAnswer:
@@ -71,8 +71,8 @@ class Apart:
             self._process, self._lock, self._owner = None, threading.Lock(), os.getpid()
         with self._lock:
             try:
-                said, used = json.loads(self._answer(_line([self.solver, script, limit]), time.monotonic() + seconds))
-                return said, used
+                answer, used = json.loads(self._answer(_line([self.solver, script, limit]), time.monotonic() + seconds))
+                return answer, used
             except TimeoutError:
                 self._end()
                 raise
@@ -102,16 +102,16 @@ class Apart:
         assert self._process.stdout is not None
         self._process.stdin.write(asked)
         self._process.stdin.flush()
-        said = b""
-        while not said.endswith(b"\n"):
+        answer = b""
+        while not answer.endswith(b"\n"):
             left = end - time.monotonic()
             if left <= 0 or not select.select([self._process.stdout], [], [], left)[0]:
                 raise TimeoutError
             part = os.read(self._process.stdout.fileno(), 1 << 16)
             if not part:
                 raise ValueError("it ended")
-            said += part
-        return said
+            answer += part
+        return answer
 
     def _end(self) -> None:
         if self._process is None:
@@ -179,10 +179,10 @@ def _ask_cvc5(script: str, limit: int) -> tuple[str, int]:
             command = parser.nextCommand()
             if command.isNull():
                 return found, _steps(solver)
-            said = command.invoke(solver, symbols).strip()
-            if said.split(" ")[0] in {"sat", "unsat", "unknown"}:
-                found = said.split(" ")[0]  # "unknown (INCOMPLETE)"
-            elif said and said != "success":
+            answer = command.invoke(solver, symbols).strip()
+            if answer.split(" ")[0] in {"sat", "unsat", "unknown"}:
+                found = answer.split(" ")[0]  # "unknown (INCOMPLETE)"
+            elif answer and answer != "success":
                 return "", 0
     except RuntimeError:
         return "", 0

@@ -104,16 +104,16 @@ def _ask(
     if engine == "qsat":
         return _ask_qsat(translator, assertions, tracked, granted)
     loaded = _Loaded.of(translator, assertions, tracked)
-    said = loaded.put(translator, loaded.switches, granted, seed)
-    match said.status:
+    answer = loaded.put(translator, loaded.switches, granted, seed)
+    match answer.status:
         case "sat":
             return "sat", loaded.solver.model(), (), ""
         case "unsat":
             return "unsat", None, loaded.core(), ""
         case "unknown":
-            return "unknown", None, (), said.reason
+            return "unknown", None, (), answer.reason
         case _:
-            assert_never(said.status)
+            assert_never(answer.status)
 
 
 def _granted(effort: int) -> int:
@@ -223,12 +223,12 @@ def _ask_qsat(
     tactic = "nlqsat" if _real_polynomials(everything) else "qsat"
     solver = z3.Tactic(tactic, ctx=translator.context).solver()
     solver.add(*everything)
-    said = put(translator, solver, effort, None if tactic == "nlqsat" else 0)
-    if said.status == "sat":
+    answer = put(translator, solver, effort, None if tactic == "nlqsat" else 0)
+    if answer.status == "sat":
         return "sat", solver.model(), (), ""
-    if said.status == "unsat" and _arithmetic_only(everything):
+    if answer.status == "unsat" and _arithmetic_only(everything):
         return "unsat", None, tuple(label for label, _ in tracked), ""
-    return "unknown", None, (), said.reason
+    return "unknown", None, (), answer.reason
 
 
 def _arithmetic_only(exprs: Iterable[Expr]) -> bool:

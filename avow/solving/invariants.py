@@ -75,9 +75,9 @@ def _asked(
     nothing = z3.BoolVal(False, ctx=translator.context)
 
     def rule(premises: Iterable[Term], more: Sequence[Expr], conclusion: Expr) -> None:
-        said = [term for term in premises if _sayable(term)]
-        spoken = {*state, *state.values()}.union(*map(free_variables, said))
-        parts = [*map(translator.term, said), *translator.background(spoken), *more]
+        usable = [term for term in premises if _sayable(term)]
+        spoken = {*state, *state.values()}.union(*map(free_variables, usable))
+        parts = [*map(translator.term, usable), *translator.background(spoken), *more]
         constants = [translator.variable(v) for v in sorted(spoken, key=lambda v: (v.qualified, repr(v.sort)))]
         body = z3.And(*parts) if parts else z3.BoolVal(True, ctx=translator.context)
         solver.add(z3.ForAll(constants, z3.Implies(body, conclusion)))
@@ -85,10 +85,10 @@ def _asked(
     rule(begins, [], after)
     rule(goes_on, [before], after)
     rule(last, [before], nothing)
-    said = put(translator, solver, effort, None)
-    if said.status == "unsat":
+    answer = put(translator, solver, effort, None)
+    if answer.status == "unsat":
         return Found(broken=True)
-    if said.status != "sat":
+    if answer.status != "sat":
         return None
     meaning = solver.model()[holds]
     if meaning is None or meaning.num_entries() > 0:

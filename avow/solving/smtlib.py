@@ -112,10 +112,10 @@ def to_smtlib(contract: Contract) -> Partial:
             first = " ".join(show_term(cell.begins(), "rcl").split())
             comment += f"\nbefore the first step: {first}" if cell.initial is not None else ""
         refused |= {name: why for name, formula in formulas.items() if (why := _unsaid(formula))}
-        said = {name: formula for name, formula in formulas.items() if name not in refused}
-        names = ", ".join(clause.name for clause in node.clauses if clause.name in said)
+        expressible = {name: formula for name, formula in formulas.items() if name not in refused}
+        names = ", ".join(clause.name for clause in node.clauses if clause.name in expressible)
         if names:
-            scripts.append(formulas_script(said, comment=f"node {node.name}: {names}{comment}"))
+            scripts.append(formulas_script(expressible, comment=f"node {node.name}: {names}{comment}"))
         clauses = {clause.name: clause.span for clause in node.clauses}
         missing += [
             Diagnostic(

@@ -249,21 +249,21 @@ def _runs(
         for events, start, end in given
     ]
     try:
-        told = ask(subject, asked, seconds=DRIVEN_SECONDS, megabytes=DRIVEN_MEGABYTES)
+        answer = ask(subject, asked, seconds=DRIVEN_SECONDS, megabytes=DRIVEN_MEGABYTES)
     except ToolMissing as missing:
         raise _refused(source, str(missing)) from None
-    if told.silent:
-        raise _refused(source, told.fault, Silent)
-    if told.fault or len(told.replies) != len(asked):
-        raise _refused(source, told.fault or "there is no answer")
-    refused = dict.fromkeys(why for reply in told.replies for why in reply.pop("refused"))
+    if answer.silent:
+        raise _refused(source, answer.fault, Silent)
+    if answer.fault or len(answer.replies) != len(asked):
+        raise _refused(source, answer.fault or "there is no answer")
+    refused = dict.fromkeys(why for reply in answer.replies for why in reply.pop("refused"))
     if refused:
         raise _refused(source, f"{source.class_name} asks for what is not driven: {', '.join(refused)}")
-    outside = [seen.path for seen in told.observed if seen.kind is Seen.OUTSIDE]
+    outside = [seen.path for seen in answer.observed if seen.kind is Seen.OUTSIDE]
     if outside and not quiet:
         text = f"what {source.class_name} publishes hangs on what no recording has: {', '.join(outside)}"
         raise _refused(source, text)
-    return tuple(_made(reply) for reply in told.replies), told
+    return tuple(_made(reply) for reply in answer.replies), answer
 
 
 def _made(reply: Mapping[str, Any]) -> Run:

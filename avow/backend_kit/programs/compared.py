@@ -30,22 +30,22 @@ def compared(recorded: Sequence[Recorded], run: Run) -> Iterator[Compared]:
     """For each topic that the class publishes."""
     copied = {_stamp(event.data) for event, _ in recorded if event.topic not in run.spoken}
     for topic in sorted(run.spoken):
-        said = [event for event in run.said if event.topic == topic]
+        published = [event for event in run.said if event.topic == topic]
         before = [(event, raw) for event, raw in recorded if event.topic == topic]
         wrong = [
             (number, event, there, raw)
-            for number, (event, (there, raw)) in enumerate(zip(said, before, strict=False), start=1)
+            for number, (event, (there, raw)) in enumerate(zip(published, before, strict=False), start=1)
             if not _same(event.data, there.data, fields_of(raw))
         ]
         other = tuple((n, e, raw) for n, e, there, raw in wrong if not _by_clock(e, there, fields_of(raw), copied))
-        yield Compared(topic, len(said), len(before), other, len(wrong) - len(other))
+        yield Compared(topic, len(published), len(before), other, len(wrong) - len(other))
 
 
-def _same(said: Any, recorded: Any, fields: Mapping[str, Any]) -> bool:
+def _same(published: Any, recorded: Any, fields: Mapping[str, Any]) -> bool:
     """Whether they are equal in the recorded fields; a recording without fields matches no message that has some."""
-    if not fields and said["d"]:
+    if not fields and published["d"]:
         return False
-    return json.dumps(_plain_fields(said, fields)) == json.dumps(_plain_fields(recorded, fields))
+    return json.dumps(_plain_fields(published, fields)) == json.dumps(_plain_fields(recorded, fields))
 
 
 def _plain_fields(data: Any, like: Any) -> Any:
@@ -57,14 +57,14 @@ def _plain_fields(data: Any, like: Any) -> Any:
     return data
 
 
-def _by_clock(said: Event, recorded: Event, fields: Mapping[str, Any], copied: set[int | None]) -> bool:
+def _by_clock(published: Event, recorded: Event, fields: Mapping[str, Any], copied: set[int | None]) -> bool:
     """Whether they differ only in stamps that are each its clock's time: the class's is the time of its publication,
     the recorded one at most a second from its own, and neither is the stamp of a message that it received."""
-    mine, old = _stamp(said.data), _stamp(recorded.data)
+    mine, old = _stamp(published.data), _stamp(recorded.data)
     if not mine or not old or copied & {mine, old}:  # none, or not stamped
         return False
-    near = mine == said.at and abs(old - recorded.at) <= SECOND
-    return near and _same(_unstamped(said.data), _unstamped(recorded.data), fields)
+    near = mine == published.at and abs(old - recorded.at) <= SECOND
+    return near and _same(_unstamped(published.data), _unstamped(recorded.data), fields)
 
 
 def _stamp(data: Any) -> int | None:

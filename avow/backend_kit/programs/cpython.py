@@ -133,8 +133,8 @@ def main() -> None:
             replies += found
     finally:
         fault = process.close() or fault
-    told = Told(tuple(replies), fault, process.observed(), process.isolation, bool(process.fault), bool(process.silent))
-    judge.say(channel, told)
+    made = Told(tuple(replies), fault, process.observed(), process.isolation, bool(process.fault), bool(process.silent))
+    judge.say(channel, made)
 
 
 if __name__ == "__main__":

@@ -52,7 +52,7 @@ def compiled(node: Node, records: Records) -> Remembering:
     """The node's clauses compiled with `records`, which must not have made cells for other clauses."""
     unsaid: dict[str, Unsaid] = {}
 
-    def said(clauses: Iterable[Clause]) -> Iterator[Clause]:
+    def rewritten(clauses: Iterable[Clause]) -> Iterator[Clause]:
         for clause in clauses:
             try:
                 yield replace(clause, formula=records.clause(clause.formula)) if histories(clause.formula) else clause
@@ -60,7 +60,7 @@ def compiled(node: Node, records: Records) -> Remembering:
                 unsaid[clause.name] = reason
                 yield clause
 
-    assumptions, guarantees = tuple(said(node.assumptions)), tuple(said(node.guarantees))
+    assumptions, guarantees = tuple(rewritten(node.assumptions)), tuple(rewritten(node.guarantees))
     compiled = replace(node, assumptions=assumptions, guarantees=guarantees)
     return Remembering(compiled, tuple(records.cells), unsaid)
 

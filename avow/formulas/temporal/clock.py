@@ -387,7 +387,7 @@ def _remade(term: t.Term, parts: list[t.Term]) -> t.Term:
             return term if same else term.rebuild(tuple(parts))
 
 
-def _small(made: t.Term, said: t.Term) -> t.Term:
+def _small(made: t.Term, whole: t.Term) -> t.Term:
     """The formula. Raises Unsaid if it is too large: each limit inside another doubles the formula a few times."""
     sizes: dict[int, int] = {}
 
@@ -397,5 +397,5 @@ def _small(made: t.Term, said: t.Term) -> t.Term:
         return sizes[id(term)]
 
     if size(made) > CLOCKED_SIZE:
-        raise Unsaid("limits in seconds inside one another, of which there are too many", said.span)
+        raise Unsaid("limits in seconds inside one another, of which there are too many", whole.span)
     return made
