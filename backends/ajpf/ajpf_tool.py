@@ -107,10 +107,10 @@ def _find(home_text: str, java: str) -> Installation | None:
     if not home_text or not (home / "lib" / "3rdparty").is_dir() or not (home / "bin").is_dir():
         return None
     try:
-        said = run([java, "-version"], seconds=VERSION_SECONDS)
+        result = run([java, "-version"], seconds=VERSION_SECONDS)
     except ToolMissing:
         return None
-    version = re.search(r'version "(11[^"]*)"', said.stdout + said.stderr)
+    version = re.search(r'version "(11[^"]*)"', result.stdout + result.stderr)
     if version is None:
         return None
     beside = Path(shutil.which(java) or java).with_name("javac")
@@ -121,9 +121,9 @@ def _find(home_text: str, java: str) -> Installation | None:
 def _revision(home: Path) -> str:
     """The commit of MCAPL's checkout; if it is not a checkout, a digest of its controller's class."""
     if (home / ".git").exists() and shutil.which("git"):
-        said = run(["git", "-C", str(home), "rev-parse", "--short=10", "HEAD"], seconds=VERSION_SECONDS)
-        if said.code == 0 and said.stdout.strip():
-            return said.stdout.strip()
+        result = run(["git", "-C", str(home), "rev-parse", "--short=10", "HEAD"], seconds=VERSION_SECONDS)
+        if result.code == 0 and result.stdout.strip():
+            return result.stdout.strip()
     compiled = home / "bin" / "ajpf" / "MCAPLcontroller.class"
     return (
         f"with classes {sha256(read_regular(compiled)).hexdigest()[:10]}" if compiled.is_file() else "without a version"
@@ -199,16 +199,16 @@ def judge(done: Completed) -> Answer:
     holds, violated = _NO_ERROR.search(text), _VIOLATED.search(text)
     once = len(_RESULTS.findall(text)) == 1  # an agent prints into the same text
     if done.timed_out:
-        said, reason = Said.TIMEOUT, f"no answer in {done.seconds:.0f} s; {ALLOWS_MORE}"
+        result, reason = Said.TIMEOUT, f"no answer in {done.seconds:.0f} s; {ALLOWS_MORE}"
     elif parser:
-        said, reason = Said.ERROR, f"AJPF's parser complained: {parser[0].strip()}"
+        result, reason = Said.ERROR, f"AJPF's parser complained: {parser[0].strip()}"
     elif "search constraint" in text:
-        said, reason = Said.INCONCLUSIVE, "a search constraint cut the search short"
+        result, reason = Said.INCONCLUSIVE, "a search constraint cut the search short"
     elif holds and once and not violated and "error #" not in text:
-        said, reason = Said.HOLDS, ""
+        result, reason = Said.HOLDS, ""
     elif violated and not holds:
-        said, reason = Said.VIOLATED, ""
+        result, reason = Said.VIOLATED, ""
     else:
-        said, reason = Said.ERROR, f"no answer that can be relied upon (exit code {done.code})"
+        result, reason = Said.ERROR, f"no answer that can be relied upon (exit code {done.code})"
     log = f"{' '.join(done.command)}\n\n{done.stdout}\n--- stderr ---\n{done.stderr}"
-    return Answer(said, reason, log, framework[1].strip() if framework else "")
+    return Answer(result, reason, log, framework[1].strip() if framework else "")

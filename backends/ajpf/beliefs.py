@@ -168,8 +168,8 @@ def _sent(beliefs: Beliefs, term: Struct, bindings: Bindings) -> Iterator[Bindin
     assert isinstance(meant, Struct)
     for message in beliefs.index.get((SENT, 4), ()):
         names = zip(meant.args[:2], message.args[:2], strict=True)
-        told = tuple(name if name_of(wanted) == wanted and is_ground(wanted) else _text(name) for wanted, name in names)
-        found = unify(meant, Struct(SENT, (*told, *message.args[2:])), bindings)
+        sent = tuple(name if name_of(wanted) == wanted and is_ground(wanted) else _text(name) for wanted, name in names)
+        found = unify(meant, Struct(SENT, (*sent, *message.args[2:])), bindings)
         if found is not None:
             yield found
 

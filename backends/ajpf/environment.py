@@ -103,13 +103,13 @@ class Environment:
             for name, places in narrowed.items():
                 what = " or ".join("as before" if i < 0 else self._said(name, i) for i in places)
                 drawn.setdefault(what, []).append(name)
-            said = tuple(
+            texts = tuple(
                 f"{_listed(names)} {'is' if len(names) == 1 else 'are'} {what}" for what, names in drawn.items()
             )
-            alike.setdefault(said, []).append(action)
-        for said, actions in alike.items():
-            if said:
-                yield f"after {_listed(actions, 'or')}, {', '.join(said)}"
+            alike.setdefault(texts, []).append(action)
+        for texts, actions in alike.items():
+            if texts:
+                yield f"after {_listed(actions, 'or')}, {', '.join(texts)}"
 
     def describe(self) -> tuple[str, ...]:
         """What the environment may do, in sentences."""
@@ -121,10 +121,10 @@ class Environment:
         if self.at_quiescence != "never":
             often = "once" if self.at_quiescence == "once" else "again and again"
             when.append(f"{often} when the agent has nothing to do")
-        said = [f"percepts are drawn {', '.join(when)}, one of each group: {groups}"]
-        said += self._narrowings()
-        said += [f"fairness: draws with {show(f.percept)} never cease ({f.because})" for f in self.fair]
-        return tuple(said)
+        texts = [f"percepts are drawn {', '.join(when)}, one of each group: {groups}"]
+        texts += self._narrowings()
+        texts += [f"fairness: draws with {show(f.percept)} never cease ({f.because})" for f in self.fair]
+        return tuple(texts)
 
     def _said(self, name: str, place: int) -> str:
         percept = dict(self.groups)[name][place]

@@ -171,7 +171,7 @@ def _instantiate(clause: Clause, mapper: Mapper, stand_ins: Sequence[Extra], key
             domains.append(values)
         for choice in product(*domains):
             values_now = dict(zip(used, choice, strict=True))
-            said = ", ".join(f"{v.name} = {n}" for v, n in values_now.items())
+            label = ", ".join(f"{v.name} = {n}" for v, n in values_now.items())
             left_side, right_side = substituted(antecedent, values_now), substituted(consequent, values_now)
             ending = timing
             if timing is not None and timing.ends is not None:
@@ -182,17 +182,17 @@ def _instantiate(clause: Clause, mapper: Mapper, stand_ins: Sequence[Extra], key
                     left[item] = None
                     continue
                 if item.trigger == psl.FALSE:
-                    settled.append(f"{said or 'the guarantee'}: the scenario and the table rule the trigger out")
+                    settled.append(f"{label or 'the guarantee'}: the scenario and the table rule the trigger out")
                     continue
                 formula = item.formula
                 found.setdefault(formula, item)
                 about.setdefault(formula, [])
-                if said and said not in about[formula]:
-                    about[formula].append(said)
+                if label and label not in about[formula]:
+                    about[formula].append(label)
                 if len(found) > PROPERTIES:
                     raise NotCovered(f"more than {PROPERTIES} instances", clause.span)
             if not made:
-                settled.append(f"{said or 'the guarantee'}: the scenario and the table alone make it true")
+                settled.append(f"{label or 'the guarantee'}: the scenario and the table alone make it true")
     properties = tuple(
         replace(p, key=_key(clause.name, about[f], keys), about=together(about[f])) for f, p in found.items()
     )
@@ -224,10 +224,10 @@ def _extra(extra: Extra, keys: set[str]) -> tuple[Property, ...]:
     found = []
     for choice in product(*extra.indices.values()):
         values: Mapping[str, int] = dict(zip(extra.indices, choice, strict=True))
-        said = ", ".join(f"{n} = {v}" for n, v in values.items())
+        label = ", ".join(f"{n} = {v}" for n, v in values.items())
         formula = instantiate(extra.formula, values)
         trigger, goal = _response(formula)
-        found.append(Property(_key(extra.name, [said] if said else [], keys), formula, trigger, goal, said))
+        found.append(Property(_key(extra.name, [label] if label else [], keys), formula, trigger, goal, label))
     return tuple(found)
 
 
@@ -291,14 +291,14 @@ def _vocabulary(setup: Setup) -> dict[str, set[_Word]]:
         return (deed.term for deed in deeds if deed.kind in kinds)
 
     percepts = _words(fact for _, group in setup.environment.groups for fact in group if fact is not None)
-    told = _words(deed.term.args[2] for deed in deeds if deed.kind is DeedKind.SEND and isinstance(deed.term, Struct))
-    told = told if len(programs) > 1 else set()  # an agent may believe or want what a message tells it
+    sent = _words(deed.term.args[2] for deed in deeds if deed.kind is DeedKind.SEND and isinstance(deed.term, Struct))
+    sent = sent if len(programs) > 1 else set()  # an agent may believe or want what a message tells it
     sent = {("send", 2)} if any(deed.kind is DeedKind.SEND for deed in deeds) else set()
     heads = (rule.head for program in programs for rule in program.rules)
     beliefs = _words((*(b for program in programs for b in program.beliefs), *heads, *done(DeedKind.ADD_BELIEF)))
     goals = _words((*(goal.term for program in programs for goal in program.goals), *done(DeedKind.ADD_GOAL)))
     actions = _words(done(DeedKind.ACTION)) | sent
-    return {"belief": beliefs | percepts | told, "goal": goals | told, "action": actions, "percept": percepts}
+    return {"belief": beliefs | percepts | sent, "goal": goals | sent, "action": actions, "percept": percepts}
 
 
 def _words(terms: Iterable[object]) -> set[_Word]:

@@ -231,8 +231,8 @@ class Mapper:
         if truth is not None:
             self.granted.add(row.text)
             return YES if truth else NO
-        said = row.say(values)
-        if self.words.setdefault(formula, said) != said:  # the row omits an index: one formula for several
+        meaning = row.say(values)
+        if self.words.setdefault(formula, meaning) != meaning:  # the row omits an index: one formula for several
             self.words[formula] = row.say({})
         body = term.body if isinstance(term, Not) else term
         return Unit(formula, _has_output(term), _only_forbids(term), body)

@@ -104,8 +104,8 @@ def _unexpected(error: UnexpectedInput, text: str, file: str) -> Diagnostic:
 
 def _wanted(names: Any) -> str | None:
     terminals = {t.name: t for t in _grammar().terminals}
-    said = sorted({_SAID.get(n) or (f"'{terminals[n].pattern.value}'" if n in terminals else n) for n in names})
-    return "expected " + " or ".join(said) if 0 < len(said) <= 8 else None
+    expected = sorted({_SAID.get(n) or (f"'{terminals[n].pattern.value}'" if n in terminals else n) for n in names})
+    return "expected " + " or ".join(expected) if 0 < len(expected) <= 8 else None
 
 
 def _quote(text: str) -> str:

@@ -97,9 +97,9 @@ def _never(trigger: Formula, kept: Formula) -> Property:
 
 def _until(trigger: Formula, kept: Formula, ended: Formula) -> Property:
     """A condition that holds from the trigger on, until another holds, which need not happen."""
-    said = Always(Implies(trigger, Release(ended, psl.disjunction([kept, ended]))))
+    whole = Always(Implies(trigger, Release(ended, psl.disjunction([kept, ended]))))
     why = "it fails in some state of the agent, and a step of the contract may have several: that refutes nothing"
-    return Property("", said, trigger, indecisive=why)
+    return Property("", whole, trigger, indecisive=why)
 
 
 def _stand_in(units: Sequence[Unit], least: Formula, extras: Sequence[Extra]) -> Left | None:

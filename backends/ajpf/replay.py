@@ -105,23 +105,23 @@ def replay(
     files = system_files(setup, "agent", scripted=True)
     asked = [expected(graph, lasso) for graph, lasso in runs]
     keys = [key({**files, SCRIPT: script.text()}, "replay", installation.mark()) for _, script in asked]
-    told = [recall(each) for each in keys]
-    new = [at for at, answer in enumerate(told) if answer is None]
+    answers = [recall(each) for each in keys]
+    new = [at for at, answer in enumerate(answers) if answer is None]
     if new:
         fresh = _run(installation, files, [asked[at][1] for at in new], folder, outside)
         for at, answer in zip(new, fresh, strict=True):
-            told[at] = answer
-    return tuple(_judged(*each) for each in zip(told, asked, keys, strict=True))
+            answers[at] = answer
+    return tuple(_judged(*each) for each in zip(answers, asked, keys, strict=True))
 
 
-def _judged(told: Answer | None, asked: tuple[Sequence[Moment], Script], key: str) -> Answer:
-    assert told is not None
-    if told.said is Said.ERROR:
-        return told
-    if (difference := _difference(asked[0], told.log)) is not None:
-        return replace(told, said=Said.VIOLATED, reason=difference)
-    keep(key, told)  # any other result may be due to the machine, and is retried
-    return told
+def _judged(answer: Answer | None, asked: tuple[Sequence[Moment], Script], key: str) -> Answer:
+    assert answer is not None
+    if answer.said is Said.ERROR:
+        return answer
+    if (difference := _difference(asked[0], answer.log)) is not None:
+        return replace(answer, said=Said.VIOLATED, reason=difference)
+    keep(key, answer)  # any other result may be due to the machine, and is retried
+    return answer
 
 
 def sampled(graph: Graph, runs: int) -> Iterator[Lasso]:
@@ -168,10 +168,10 @@ def _run(
 
 
 def _difference(moments: Sequence[Moment], output: str) -> str | None:
-    told = [_VARIABLE.sub("_", line.removeprefix(MARK)) for line in output.splitlines() if line.startswith(MARK)]
+    lines = [_VARIABLE.sub("_", line.removeprefix(MARK)) for line in output.splitlines() if line.startswith(MARK)]
     for at, moment in enumerate(moments):
         ours = moment.text()
-        theirs = told[at] if at < len(told) else "nothing more"
+        theirs = lines[at] if at < len(lines) else "nothing more"
         if ours != theirs:
             return f"moment {at + 1}: our run has '{_short(ours)}', AIL's '{_short(theirs)}'"
     return None

@@ -114,18 +114,18 @@ def _left_to_a_person(claim: Claim, attached: Sequence[tuple[Extra, Sequence[Pro
     """
     for name in dict.fromkeys(left.extra for left in claim.left):
         bans = list(dict.fromkeys(left.ban for left in claim.left if left.extra == name))
-        said = psl.conjunction([p.formula for e, ps in attached for p in ps if e.name == name])
+        stated = psl.conjunction([p.formula for e, ps in attached for p in ps if e.name == name])
         forbidden = "; ".join(dict.fromkeys(left.forbidden for left in claim.left if left.extra == name))
-        if all(_rules_out(said, ban) for ban in bans):
+        if all(_rules_out(stated, ban) for ban in bans):
             found = "it rules out, of every agent, that this comes while the guarantee's condition holds"
         else:
             found = "that it forbids no less than the guarantee does, under the guarantee's condition, was not shown"
         yield f"the plan's property '{name}' says rightly when {forbidden} must not be: {found}"
 
 
-def _rules_out(said: psl.Formula, ban: psl.Formula) -> bool:
+def _rules_out(stated: psl.Formula, ban: psl.Formula) -> bool:
     try:
-        return is_valid(psl.Implies(said, ban))
+        return is_valid(psl.Implies(stated, ban))
     except TooLarge:
         return False
 

@@ -37,8 +37,8 @@ def timed(formula: Term) -> Timed | None:
         return None
     outer, triggers, response = found
     trigger, wanted = conjunction(triggers), response.arguments[0]
-    said: Term = wanted if trigger == TRUE else Implies(trigger, wanted)
-    whole = Quantified(Quantifier.FORALL, outer, said) if outer else said
+    body: Term = wanted if trigger == TRUE else Implies(trigger, wanted)
+    whole = Quantified(Quantifier.FORALL, outer, body) if outer else body
     ends = response.arguments[1] if response.operator is Past.UNTIL else None
     return Timed(response.operator, whole, ends, _hypothesis(response))
 

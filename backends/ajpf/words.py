@@ -64,8 +64,8 @@ class Wording:
                 yield self.told[formula]
                 rest = [item for item in rest if item not in formula.items]
         for item in rest:
-            said = self.say(item)
-            yield f"({said})" if kind is psl.And and " ∨ " in said else said
+            text = self.say(item)
+            yield f"({text})" if kind is psl.And and " ∨ " in text else text
 
     def _part_of(self, formula: Formula) -> str:
         """One of the alternatives that a row stands for: the row, and which of them it is."""

@@ -120,7 +120,7 @@ class History:
 def history(steps: Stepping, words: Vocabulary) -> History:
     """The history of a node. Raises NotExpressible."""
     cells = tuple(cell.before for cell in steps.cells)
-    told = tuple(
+    comments = tuple(
         f"  //   {words.local(c.before)}: {one_line(show_term(c.record, 'rcl'))}"
         for c in steps.cells
         if c.record is not None
@@ -128,7 +128,7 @@ def history(steps: Stepping, words: Vocabulary) -> History:
     begins = print_clause(_named("begins", words), conjunction(c.begins() for c in steps.cells), words)
     moves = [print_clause(_named(f"{words.local(c.before)}_next", words), c.now, words) for c in steps.cells]
     ports = tuple(p.variable for p in (*steps.own.inputs, *steps.own.outputs))
-    return History(cells, begins, tuple(moves), ports, told)
+    return History(cells, begins, tuple(moves), ports, comments)
 
 
 def _named(wanted: str, words: Vocabulary) -> str:

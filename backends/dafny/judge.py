@@ -101,9 +101,9 @@ def settle(
             unproved |= dict.fromkeys(spared, left)
     about_nothing: frozenset[str] = frozenset()
     if environment != "true" and generated.conditions and not all(unproved.values()):
-        said = verify(_asked_of_env(files, generated), limits, outside)
-        logs["excluded.log"] = said.output
-        about_nothing = _about_nothing(said, generated)
+        answer = verify(_asked_of_env(files, generated), limits, outside)
+        logs["excluded.log"] = answer.output
+        about_nothing = _about_nothing(answer, generated)
     tried = [dict(c) for c in candidates(run.model, node)] if any(unproved.values()) else []
     verdicts = {name: _verdict(unproved[name], taken, environment, scanned, generated, tried) for name in guarantees}
     for name in about_nothing & {n for n, settled in verdicts.items() if settled.verdict is Verdict.PROVED}:
@@ -151,8 +151,8 @@ def _broken(run: Run, scanned: Scan, generated: Generated, shown_name: str) -> S
     printed = _FINISHED.search(run.output)
     if run.members is not None and printed is not None and run.code in (0, 4):
         return None
-    said = [c for c in run.complaints if c.message.startswith("Error")]
-    errors = [f"{_name(c.file, generated, shown_name)}:{c.line}: {c.message}" for c in said]
+    failed = [c for c in run.complaints if c.message.startswith("Error")]
+    errors = [f"{_name(c.file, generated, shown_name)}:{c.line}: {c.message}" for c in failed]
     count = run.counted or len(errors)
     problems = [what for _, what in scanned.problems]
     details: dict[str, object] = {"errors": errors, "problems": problems}

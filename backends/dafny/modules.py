@@ -149,8 +149,8 @@ def generate(node: Node, guarantees: Sequence[str]) -> Generated:
     past = history(steps, words) if steps is not None else History()
     node = replace(node, assumptions=steps.node.assumptions, guarantees=steps.node.guarantees) if steps else node
     for clause in node.assumptions:
-        if told := [v.name for v in free_variables(clause.formula) if v in outputs]:
-            raise NotExpressible(f"assumption {clause.name}: it speaks of the output {told[0]}", clause.span)
+        if outputs_used := [v.name for v in free_variables(clause.formula) if v in outputs]:
+            raise NotExpressible(f"assumption {clause.name}: it speaks of the output {outputs_used[0]}", clause.span)
     assumed = [print_clause(c.name, c.formula, words) for c in node.assumptions]
     promised: list[tuple[Clause, tuple[Predicate, ...]]] = []
     uncovered: list[tuple[str, str]] = []

@@ -61,8 +61,8 @@ def verify(files: Mapping[str, str], limits: Limits, outside: Outside) -> Run:
     each = max(1, min(30, int(limits.seconds / 2)))
     if not has_commands(dafny().version):
         flags = ("/nologo", "/compile:0", f"/timeLimit:{each}", "/errorLimit:20")
-        said = (f"/xml:{_ANSWER}", f"/mv:{_MODEL}", f"/rprint:{_RESOLVED}")
-        done = _run((*flags, *said), files, limits, outside)
+        answers = (f"/xml:{_ANSWER}", f"/mv:{_MODEL}", f"/rprint:{_RESOLVED}")
+        done = _run((*flags, *answers), files, limits, outside)
         members = read_members(done.answers[_ANSWER]) if done.answers[_ANSWER] else None
         return _answer(done, members, done.answers[_RESOLVED])
     done = _run(modern.verify_arguments(each, lenient=True), files, limits, outside)
@@ -81,8 +81,8 @@ def audit(files: Mapping[str, str], limits: Limits, outside: Outside) -> Audit:
         return Audit(None if done.code is None else modern.read_audit(done.output), done.output)
     done = _run(("/nologo", "/compile:0", "/noVerify", "/spillTargetCode:3"), files, limits, outside)
     found = complaints(done.output)
-    said = done.code in (0, 3) and _FINISHED.search(done.output) is not None
-    if not said or (done.code == 3 and not any(c.message.startswith("Error") for c in found)):
+    finished = done.code in (0, 3) and _FINISHED.search(done.output) is not None
+    if not finished or (done.code == 3 and not any(c.message.startswith("Error") for c in found)):
         return Audit(None, done.output)
     return Audit(found, done.output)
 
@@ -96,8 +96,8 @@ class _Done:
 
 
 def _answer(done: _Done, members: tuple[Member, ...] | None, resolved: str | None = None) -> Run:
-    said, model = complaints(done.output), done.answers[_MODEL][:MODEL_CHARACTERS]
-    return Run(done.command, done.code, members, said, counted(done.output), done.output, model, resolved)
+    complained, model = complaints(done.output), done.answers[_MODEL][:MODEL_CHARACTERS]
+    return Run(done.command, done.code, members, complained, counted(done.output), done.output, model, resolved)
 
 
 def _run(first: Sequence[str], files: Mapping[str, str], limits: Limits, outside: Outside) -> _Done:

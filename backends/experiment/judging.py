@@ -74,7 +74,7 @@ def claim(clause: Clause, assumptions: Iterable[Clause], meanings: Iterable[Inte
         return Formula.made(name, records.clause(formula) if histories(formula) else formula)
 
     assumptions = tuple(assumptions)
-    said = (clause.formula, *(each.formula for each in assumptions))
+    formulas = (clause.formula, *(each.formula for each in assumptions))
     formula = interpreted(clause.formula, known_meanings)
     assumed = {each.name: interpreted(each.formula, known_meanings) for each in assumptions}
     unseen = [name for name, term in assumed.items() if not _ports(term) <= known]
@@ -89,7 +89,7 @@ def claim(clause: Clause, assumptions: Iterable[Clause], meanings: Iterable[Inte
         frozenset(name for term in judged_terms for name in _ports(term) & known),
         any(histories(term) for term in judged_terms),
         tuple(records.cells),
-        tuple(one.text for one in known_meanings if any(interpreted(each, [one]) != each for each in said)),
+        tuple(one.text for one in known_meanings if any(interpreted(each, [one]) != each for each in formulas)),
     )
 
 
@@ -193,9 +193,9 @@ def _choices(condition: Term) -> tuple[Term, ...]:
 
 
 def _dead(condition: Term, assumed: Mapping[str, Term]) -> bool:
-    said = {**assumed, "": condition}
-    plain = not any(histories(term) for term in said.values())
-    return plain and solve(said, effort=JUDGE_EFFORT, values="unused").status == "unsat"
+    formulas = {**assumed, "": condition}
+    plain = not any(histories(term) for term in formulas.values())
+    return plain and solve(formulas, effort=JUDGE_EFFORT, values="unused").status == "unsat"
 
 
 def _ports(formula: Term) -> set[str]:

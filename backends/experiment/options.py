@@ -219,10 +219,10 @@ class _Reader:
 
     def _meanings(self, table: Table) -> Iterator[Interpretation]:
         columns = {name: _sort(table, name) for name in table.columns if re.fullmatch(r"[^\W\d]\w*", name)}
-        for pattern, said in self.options.get("interpret", {}).items():
+        for pattern, meaning in self.options.get("interpret", {}).items():
             place = self._at("interpret", pattern)
             try:
-                yield interpretation(pattern, said, self.job.node, self.job.contract, columns, place)
+                yield interpretation(pattern, meaning, self.job.node, self.job.contract, columns, place)
             except Unfit as unfit:
                 self.add("interpret", f"{pattern}: {unfit}", code="EXP106", entry=pattern)
             except Rejected as rejected:

@@ -67,7 +67,7 @@ def _outcome(claim: Claim, found: Sequence[tuple[Run, Judged]], experiment: Expe
         bound["worst stratum"] = f"{sample.worst.name}, {sample.worst.failures} of {sample.worst.trials} failed"
     bound["failure probability at most"] = float(sample.bound)
     seen = _seen(sample, len(found))
-    said = f"{seen}: {_most(sample, experiment)}"
+    text = f"{seen}: {_most(sample, experiment)}"
     claimed = experiment.at_least is not None and sample.bound <= 1 - experiment.at_least
     if sample.failed and not claimed:
         details[CASE] = [{"run": run.name, "rows": list(run.rows)} for run, _ in sample.failed[:FAILURES_KEPT]]
@@ -80,7 +80,7 @@ def _outcome(claim: Claim, found: Sequence[tuple[Run, Judged]], experiment: Expe
         return replace(outcome, verdict=Verdict.TESTED, vacuous=True, summary=why)
     asked = experiment.at_least or experiment.floor
     if sample.bound > 1 - asked:
-        return replace(outcome, summary=_too_few(said, sample, experiment, asked))
+        return replace(outcome, summary=_too_few(text, sample, experiment, asked))
     details[RATE] = [_row(stratum) for stratum in sample.strata]
     rests = ["the runs are independent and drawn as the robot will be used", *claim.interpreted]
     if claim.unseen:
@@ -88,7 +88,7 @@ def _outcome(claim: Claim, found: Sequence[tuple[Run, Judged]], experiment: Expe
     if sample.failed:
         details["failing runs"] = _counterexample(claim, sample.failed).explanation
         rests.append(f"the guarantee is meant statistically: in at least {_percent(asked)} of runs")
-    return replace(outcome, verdict=Verdict.TESTED, summary=said, hypotheses=tuple(rests))
+    return replace(outcome, verdict=Verdict.TESTED, summary=text, hypotheses=tuple(rests))
 
 
 def _sample(claim: Claim, found: Sequence[tuple[Run, Judged]], experiment: Experiment) -> _Sample:
@@ -154,12 +154,12 @@ def _most(sample: _Sample, experiment: Experiment) -> str:
     return f"{most} ({which}, {worst.failures} of {worst.trials} failed)"
 
 
-def _too_few(said: str, sample: _Sample, experiment: Experiment, asked: Fraction) -> str:
+def _too_few(text: str, sample: _Sample, experiment: Experiment, asked: Fraction) -> str:
     needed = runs_needed(1 - asked, Fraction(sample.worst.confidence))
     what = "the claim" if experiment.at_least is not None else "the least that this criticality asks for"
     where = " in each stratum" if len(sample.strata) > 1 else ""
     enough = f"{needed} runs without a failure{where} would" if needed is not None else "very many runs would"
-    return f"{said}; success in {_percent(asked)} of runs, {what}, is not shown: {enough}"
+    return f"{text}; success in {_percent(asked)} of runs, {what}, is not shown: {enough}"
 
 
 def _counterexample(claim: Claim, failed: Sequence[tuple[Run, Judged]]) -> Counterexample:
@@ -215,8 +215,8 @@ def _held_against(
         shown = listed(left, FAILURES_SHOWN)
         why = f"runs that failed before are missing in the data: {shown}; put them back, or name them under 'left_out'"
         return replace(outcome, verdict=Verdict.UNKNOWN, summary=why, hypotheses=(), vacuous=False)
-    said = f"that run {listed(list(missing), FAILURES_SHOWN)} failed does not count: {experiment.because}"
-    return replace(outcome, hypotheses=(*outcome.hypotheses, said))
+    text = f"that run {listed(list(missing), FAILURES_SHOWN)} failed does not count: {experiment.because}"
+    return replace(outcome, hypotheses=(*outcome.hypotheses, text))
 
 
 def _fails(run: Mapping[str, Any], claim: Claim, experiment: Experiment) -> bool:

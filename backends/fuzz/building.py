@@ -99,7 +99,7 @@ def looked_into(reading: Reading, folder: Path, outside: Outside, asked: Iterabl
     alone = _preprocessed(reading, folder, outside, _flags(Build.PLAIN), seconds)
     fuzzed = Build.FUZZED if fuzzes(_there()) else Build.PLAIN
     found = unseen(alone, _preprocessed(reading, folder, outside, _flags(fuzzed), seconds), asked)
-    return Unseen(*(plainly(said, reading, folder) for said in (found.undeclared, found.faults)))
+    return Unseen(*(plainly(text, reading, folder) for text in (found.undeclared, found.faults)))
 
 
 def _preprocessed(
@@ -181,16 +181,16 @@ def _first(done: Completed, reading: Reading, folder: Path) -> str:
     if done.timed_out:
         return "the compiler did not end in the time given"
     lines = [line for line in done.stderr.splitlines() if "error:" in line or "undefined reference" in line]
-    said = (lines or done.stderr.strip().splitlines() or [f"the compiler ended with code {done.code}"])[0]
-    return plainly(said, reading, folder)[:300]
+    text = (lines or done.stderr.strip().splitlines() or [f"the compiler ended with code {done.code}"])[0]
+    return plainly(text, reading, folder)[:300]
 
 
-def plainly(said: str, reading: Reading, folder: Path) -> str:
+def plainly(text: str, reading: Reading, folder: Path) -> str:
     """A tool's message, with places that are the same on every machine."""
     root = reading.job.root.resolve()
     own = reading.adapter.relative_to(root) if reading.adapter.is_relative_to(root) else reading.adapter
-    said = said.replace(str(folder / LINK), str(own)).replace(LINK, str(own))
-    return said.replace(str(root) + os.sep, "").replace(str(folder) + os.sep, "")
+    text = text.replace(str(folder / LINK), str(own)).replace(LINK, str(own))
+    return text.replace(str(root) + os.sep, "").replace(str(folder) + os.sep, "")
 
 
 def _listed(path: Path, folder: Path) -> list[Path]:
@@ -209,6 +209,6 @@ def observed(reading: Reading, built: tuple[Built, ...], outside: Outside) -> tu
     and the searched paths, if they are traced."""
     read = dict.fromkeys(path for one in built for path in one.read)
     folders = dict.fromkeys([reading.adapter.parent, *reading.include])
-    told = recorded([*(("read", str(p)) for p in read), *(("list", str(p)) for p in folders)])
+    seen = recorded([*(("read", str(p)) for p in read), *(("list", str(p)) for p in folders)])
     kept = f"{_wheel_cache()}{os.sep}"
-    return folded((*told, *(each for each in outside.observed() if not f"{each.path}{os.sep}".startswith(kept))))
+    return folded((*seen, *(each for each in outside.observed() if not f"{each.path}{os.sep}".startswith(kept))))

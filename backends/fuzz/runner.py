@@ -62,8 +62,8 @@ class _Program(SubjectProcess):
     def observed(self) -> tuple[Observed, ...]:
         """The reads that strace reported; unknown without strace."""
         for trace in self._traces:
-            told = trace.read_all(str(self.path), self.root)
-            self._looked.update(dict.fromkeys(told or [("outside", f"what no trace reports of {self.path.name}")]))
+            events = trace.read_all(str(self.path), self.root)
+            self._looked.update(dict.fromkeys(events or [("outside", f"what no trace reports of {self.path.name}")]))
         self._traces.clear()
         built = str(self.path.parent) + os.sep
         return recorded(each for each in self._looked if not each[1].startswith(built))
@@ -173,10 +173,10 @@ def campaign(asked: Campaign, question: Question) -> Campaigned:
     command = [str(folder / "fuzz"), *asked.options, f"-artifact_prefix={kept}/fault-", str(kept / "corpus")]
     if level is Isolation.SEALED:
         command = sealed(command, kept)
-    told = {"AVOW_CHANNEL": str(channel.theirs), "AVOW_NONCE": str(source), "HOME": str(kept), "TMPDIR": str(kept)}
-    code, left, said, printed = _ended(command, kept, question, channel, told, source)
-    words = said.split()
-    closed = len(words) == 3 and said.endswith("\n") and words[0] == nonce
+    variables = {"AVOW_CHANNEL": str(channel.theirs), "AVOW_NONCE": str(source), "HOME": str(kept), "TMPDIR": str(kept)}
+    code, left, answer, printed = _ended(command, kept, question, channel, variables, source)
+    words = answer.split()
+    closed = len(words) == 3 and answer.endswith("\n") and words[0] == nonce
     done = closed and words[1] == "done" and code == 0
     # a report of a sanitizer leaves its symbolizer behind; the run that it is about is judged by itself
     fault = "the source left processes behind" if left and code == 0 and level is not Isolation.SEALED else ""
@@ -190,7 +190,7 @@ def _ended(
     cwd: Path,
     question: Question,
     channel: judge.Channel,
-    told: Mapping[str, str],
+    variables: Mapping[str, str],
     given: int,
 ) -> tuple[int | None, bool, str, str]:
     """Run a build with sanitizers to its end, and end all processes that it leaves; `given` is a descriptor that it
@@ -203,7 +203,7 @@ def _ended(
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,
             stderr=errors,
-            env={**_OPTIONS, "PATH": os.environ.get("PATH", os.defpath), **told, "LC_ALL": "C.UTF-8"},
+            env={**_OPTIONS, "PATH": os.environ.get("PATH", os.defpath), **variables, "LC_ALL": "C.UTF-8"},
             start_new_session=True,
             pass_fds=(channel.theirs, given),
         )
@@ -217,8 +217,8 @@ def _ended(
         left = process.end_orphans()
         errors.seek(max(0, errors.seek(0, os.SEEK_END) - LOG_KEPT))
         printed = errors.read().decode("utf-8", "replace")
-    said = channel.close()
-    return code, left, said.decode("utf-8", "replace"), printed
+    answer = channel.close()
+    return code, left, answer.decode("utf-8", "replace"), printed
 
 
 def answered(asked: Runs, question: Question) -> Answered:
@@ -279,9 +279,9 @@ def shown(asked: Show, question: Question) -> Shown:
         command = [str(program), str(lines.fileno()), str(channel.theirs)]
         if level is Isolation.SEALED:
             command = sealed(command)
-        code, _, said, printed = _ended(command, Path(question.root), question, channel, {}, lines.fileno())
+        code, _, answer, printed = _ended(command, Path(question.root), question, channel, {}, lines.fileno())
     replies: list[Any] = []
-    for line in said.splitlines():
+    for line in answer.splitlines():
         try:
             message = from_text(Message, line)
         except Unreadable:

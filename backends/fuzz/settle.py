@@ -154,9 +154,9 @@ class Work:
             bench.kept = len(bench.compared) if judged <= len(shown) else bench.kept
         self._confirm(bench, program)
         if answer.unsteady is not None and not bench.broken:
-            said = bench.words(runs[answer.unsteady])
+            words = bench.words(runs[answer.unsteady])
             why = "asked again, where what nothing was written to holds other bytes, it answers otherwise"
-            raise Unanswered(Verdict.UNKNOWN, f"undeclared input: {why} ({said})")
+            raise Unanswered(Verdict.UNKNOWN, f"undeclared input: {why} ({words})")
         fault = self._fault([Drawn(data, made, reading.single).steps(reading.asked, reading.steps) for data in faults])
         if campaign is not None and not faults and campaign.done < reading.runs and not bench.crash:
             raise Unanswered(Verdict.ERROR, "libFuzzer ended without having made its runs, and without a report")
@@ -263,8 +263,8 @@ class Work:
                     best = found
                     tries = [best.run[:k] + best.run[k + 1 :] for k in range(len(best.run) - 1)]
             if best is None:
-                said = bench.words(broken.run)
-                raise Unanswered(Verdict.UNKNOWN, f"undeclared input: asked alone, it answers otherwise ({said})")
+                shown = bench.words(broken.run)
+                raise Unanswered(Verdict.UNKNOWN, f"undeclared input: asked alone, it answers otherwise ({shown})")
             bench.broken[name] = best
 
     def _fault(self, runs: list[list[Step]]) -> Broken | None:

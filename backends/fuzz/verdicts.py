@@ -207,9 +207,9 @@ class Bench:
         given = {name for name, _ in answer["value"]["d"]}
         if given != names:
             missing, extra = sorted(names - given), sorted(given - names)
-            said = [f"has {', '.join(f'`{name}`' for name in extra)}, which is no output"] if extra else []
-            said += [f"lacks {', '.join(missing)}"] if missing else []
-            raise self._misfit(f"what it gives {' and '.join(said)}", names)
+            faults = [f"has {', '.join(f'`{name}`' for name in extra)}, which is no output"] if extra else []
+            faults += [f"lacks {', '.join(missing)}"] if missing else []
+            raise self._misfit(f"what it gives {' and '.join(faults)}", names)
         sorts = {p.name: p.sort for p in self.reading.node.outputs}
         self._of_types((*answer["value"]["d"], *answer["memory"].items()), sorts)
         wide = [name for name, data in answer["value"]["d"] if self.reading.single and not _single(data)]
@@ -230,16 +230,16 @@ class Bench:
                             f"it gives `{element}` for {name}, whose type has no such element", sort.members
                         )
 
-    def _misfit(self, said: str, known: Iterable[str] = ()) -> Misused:
+    def _misfit(self, message: str, known: Iterable[str] = ()) -> Misused:
         """What the adapter has wrong: where, and the name that was probably meant by one that is not known."""
         reading = self.reading
-        name = found[1] if (found := re.search("`([^`]*)`", said)) else ""
+        name = found[1] if (found := re.search("`([^`]*)`", message)) else ""
         ports = (*reading.node.inputs, *reading.node.outputs)
         names = {*known} or {*reading.params, *(port.name for port in ports)}
         hint = did_you_mean(name, names) if name and name not in names else None
         lines = read_text(reading.adapter, errors="replace").splitlines()
         line = next((f":{at}" for at, text in enumerate(lines, 1) if f'"{name}"' in text), "")
-        why = said.removeprefix("the adapter: ")
+        why = message.removeprefix("the adapter: ")
         place = f"{reading.source.cpp}{line}"
         return Misused(f"{place}: the adapter does not fit the contract: {why}{f': {hint}' if hint else ''}")
 
@@ -337,10 +337,10 @@ class Bench:
         )
         good = {"rests_on": rests, "hypotheses": remarks}
         answered = tuple(replace(o, **good) if o.verdict is Verdict.TESTED else o for o in own)  # type: ignore[arg-type]
-        said = tuple(
+        others = tuple(
             replace(o, hypotheses=(*o.hypotheses, *remarks)) if o.verdict is Verdict.TESTED else o for o in claims
         )
-        return (*answered, *said)
+        return (*answered, *others)
 
     def _own(
         self,
@@ -362,8 +362,8 @@ class Bench:
         if o.name in self.broken:
             shown = self.broken[o.name].shown()
             case = [{name: coded(v) for name, v in step.items()} for step in self.broken[o.name].run]
-            told = {**details, CASE: case}
-            return replace(outcome, verdict=Verdict.REFUTED, summary=shown.text(), counterexample=shown, details=told)
+            kept = {**details, CASE: case}
+            return replace(outcome, verdict=Verdict.REFUTED, summary=shown.text(), counterexample=shown, details=kept)
         if self.begun is not None:
             return replace(outcome, verdict=Verdict.REFUTED, summary=self.begun.text(), counterexample=self.begun)
         if apart and refuting:

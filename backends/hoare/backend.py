@@ -170,8 +170,8 @@ def _remembered(
     deadline = until(from_seconds(limits.seconds))
     clauses = [work.job.clause(o) for o in work.job.obligations]
     seen, found = remembered(steps, work.checked, clauses, lambda c: _holds(c, work.settler, deadline))
-    told = [one_line(each.formula) for each in found.invariants]
-    logs["invariants.log"] = "\n".join((*(f"holds: {text}" for text in told), *found.lacking)) + "\n"
+    texts = [one_line(each.formula) for each in found.invariants]
+    logs["invariants.log"] = "\n".join((*(f"holds: {text}" for text in texts), *found.lacking)) + "\n"
     known = replace(work, job=knowing(work.job, steps, found.invariants), lacking=found.lacking)
     known.settler.seed = work.settler.seed
     link = Link.MAPPED if work.checked.reading.mapped else Link.GENERATED
@@ -417,7 +417,7 @@ def _counterexample(settled: Settled, work: Work) -> Counterexample:
     assert settled.breach is not None
     shown = settled.breach
     values: list[tuple[str, str]] = []
-    told: set[Variable] = set()
+    mapped: set[Variable] = set()
     for role, ports, state in (
         (Role.INPUT, work.job.node.inputs, shown.start),
         (Role.OUTPUT, work.job.node.outputs, shown.end),
@@ -431,9 +431,9 @@ def _counterexample(settled: Settled, work: Work) -> Counterexample:
             except NotEvaluable:
                 continue
             if isinstance(term, Variable):
-                told.add(term)
+                mapped.add(term)
     spoken = free_variables(conjunction((settled.triple.pre, settled.triple.post)))
-    for variable in sorted(spoken - told - frozenset(work.checked.program.assigned), key=lambda v: v.name):
+    for variable in sorted(spoken - mapped - frozenset(work.checked.program.assigned), key=lambda v: v.name):
         if variable.name in shown.start and variable not in work.checked.program.ghosts.values():
             values.append((variable.name, show(shown.start[variable.name])))
     return Counterexample(tuple(values), settled.breach.why)

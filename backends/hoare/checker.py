@@ -261,16 +261,16 @@ class _Checker:
 
     def _restrictions(self, found: Mapping[_Place, Predicate]) -> tuple[str, ...]:
         """Readings of inputs that leave out some of an input's values: the claim is then about the others."""
-        said: list[str] = []
+        limits: list[str] = []
         used: set[Variable] = set()
         for (role, name), read in sorted(found.items(), key=lambda item: (bool(item[1].parameters), item[0])):
             shown = show_term(read.meaning, "unicode")
             if role is Role.INPUT and read.parameters:
-                said.append(f"in.{name}(…) is {shown}: the plan covers no other relation")
+                limits.append(f"in.{name}(…) is {shown}: the plan covers no other relation")
             elif role is Role.INPUT and not _covers(read.meaning, sort := self.node.input(name).sort, used):
                 kind = "" if read.meaning.sort == sort else f", {show_sort(read.meaning.sort)}"
-                said.append(f"in.{name} is {shown}{kind}: the plan covers no other value of it")
-        return tuple(said)
+                limits.append(f"in.{name} is {shown}{kind}: the plan covers no other value of it")
+        return tuple(limits)
 
     # -- statements ----------------------------------------------------------------------------------------------------
 

@@ -148,8 +148,8 @@ def remembered(
     memories = [dict(pairs) for pairs in dict.fromkeys(tuple(sorted(m.items())) for m in seen.memories)]
     forms = [(each for each in family if not _contradicted(each, memories)) for family in guesses(steps)]
     found = establish(forms[:GUESSES], steps, checked, proves)
-    told = tuple(f"a run contradicts `{each.text}`" for each in steps.invariants if _contradicted(each, memories))
-    return seen, replace(found, lacking=told or found.lacking)
+    refuted = tuple(f"a run contradicts `{each.text}`" for each in steps.invariants if _contradicted(each, memories))
+    return seen, replace(found, lacking=refuted or found.lacking)
 
 
 def _contradicted(invariant: Invariant, memories: Sequence[Step]) -> bool:

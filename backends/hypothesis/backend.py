@@ -230,8 +230,8 @@ def _counted(outcome: Outcome, clause: Clause, node: Node) -> Outcome:
     if outcome.verdict is not Verdict.TESTED or not sorts:
         return outcome
     names = " and ".join(sorted(sort.name for sort in sorts))
-    told = f"{names}: an unspecified type has the elements that the cases and the subject's answers name, and no fewer"
-    made = bound(f"type.{'-'.join(sorted(sort.name for sort in sorts))}", told)
+    text = f"{names}: an unspecified type has the elements that the cases and the subject's answers name, and no fewer"
+    made = bound(f"type.{'-'.join(sorted(sort.name for sort in sorts))}", text)
     return replace(outcome, rests_on=(*outcome.rests_on, made))
 
 

@@ -292,9 +292,9 @@ class _Test:
                 yield f"    {name} = exact({name})"
         for clause in self.job.node.assumptions:
             yield from self._heading(clause)
-            said = self.said(clause)
-            if isinstance(said, str):
-                yield from (f"    {line}" for line in assume.format(_inside(_wrapped(said))).split("\n"))
+            code = self.said(clause)
+            if isinstance(code, str):
+                yield from (f"    {line}" for line in assume.format(_inside(_wrapped(code))).split("\n"))
         yield ""
         if self.runs:
             yield "    self.last = now"
@@ -318,28 +318,28 @@ class _Test:
     def _heading(self, clause: Clause) -> Iterator[str]:
         yield ""
         yield f"    # {clause.name}: {one_line(show_term(clause.formula, 'unicode'))}"
-        said = self.said(clause)
-        if isinstance(said, Untranslatable):
-            yield f"    # This is left to `avow verify`: {one_line(str(said))}."
+        code = self.said(clause)
+        if isinstance(code, Untranslatable):
+            yield f"    # This is left to `avow verify`: {one_line(str(code))}."
 
     def _asserted(self, clause: Clause) -> Iterator[str]:
-        formula, said = self.formulas[clause.name], self.said(clause)
-        if isinstance(said, Untranslatable):
+        formula, code = self.formulas[clause.name], self.said(clause)
+        if isinstance(code, Untranslatable):
             return
         message = repr(f"{clause.name}: {one_line(clause.sentence)}" if clause.sentence else clause.name)
         indent = "    "
         if isinstance(formula, Implies):
             yield f"    if {self.after.formula(formula.left)}:"
-            indent, said = "        ", self.after.formula(formula.right)
-        yield from (indent + line for line in f"assert {_wrapped(said)}, {message}".split("\n"))
+            indent, code = "        ", self.after.formula(formula.right)
+        yield from (indent + line for line in f"assert {_wrapped(code)}, {message}".split("\n"))
 
 
-def _wrapped(said: str) -> str:
+def _wrapped(code: str) -> str:
     """A long expression in parentheses, on several lines; not if it contains a text with spaces."""
-    if len(said) < 90 or "\\" in said or any(" " in text for text in re.findall(r"""'[^']*'|"[^"]*\"""", said)):
-        return said
+    if len(code) < 90 or "\\" in code or any(" " in text for text in re.findall(r"""'[^']*'|"[^"]*\"""", code)):
+        return code
     lines = [""]
-    for part in re.split(r"(?<= )(?=(?:for|if|and|or) )", said):
+    for part in re.split(r"(?<= )(?=(?:for|if|and|or) )", code):
         lines[-1:] = [lines[-1] + part] if len(lines[-1] + part) < 90 else [lines[-1], part]
     return "(\n    " + "\n    ".join(line.strip() for line in lines) + "\n)"
 
@@ -352,11 +352,11 @@ def _inside(wrapped: str) -> str:
 def _table(job: Job, port: Port) -> tuple[sorts.FunctionSort, Rows] | None:
     """The scenario's rows for an input that it interprets."""
     scenario, sort = job.system.plan.scenario, port.sort
-    said = scenario.interpreted(job.node.name, port) if scenario is not None else None
-    if scenario is None or said is None or not isinstance(sort, sorts.FunctionSort):
+    relation = scenario.interpreted(job.node.name, port) if scenario is not None else None
+    if scenario is None or relation is None or not isinstance(sort, sorts.FunctionSort):
         return None
-    table = scenario.table(said[0])
-    at = [table.columns.index(column) for column in said[1] if column in table.columns]
+    table = scenario.table(relation[0])
+    at = [table.columns.index(column) for column in relation[1] if column in table.columns]
     columns = sort.parameters if isinstance(sort.result, sorts.BoolSort) else (*sort.parameters, sort.result)
     rows = readable(tuple(tuple(row[k] for k in at) for row in table.rows), columns)
     return (sort, rows) if rows else None

@@ -50,9 +50,9 @@ def thresholds(formulas: Iterable[Term], program: Iterable[Path], parameters: It
     stated = list(formulas)
     parts = [part for formula in stated for part in subterms(formula)]
     contract = {*numbers_of(stated), *(n for part in parts if isinstance(part, Compare) for n in _meeting(part))}
-    said = {part.value for part in parts if isinstance(part, Literal) and isinstance(part.value, str)}
+    texts = {part.value for part in parts if isinstance(part, Literal) and isinstance(part.value, str)}
     of_program = [*itertools.islice(_constants(program), tuning.CONSTANTS_READ)]
-    written = said | {text for text in of_program if isinstance(text, str)}
+    written = texts | {text for text in of_program if isinstance(text, str)}
     own = {number for number in of_program if not isinstance(number, str)} | set(parameters)
     own |= {Fraction(text) for text in written if text.isascii() and text.isdecimal()}
     few = _simple(own)[: tuning.CONSTANTS_COMBINED]

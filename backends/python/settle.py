@@ -145,9 +145,9 @@ class Work:
 
     def refusals(self) -> str:
         name = self.reading.file.name
-        said = [f"{name}:{r.line}: {r.why}" for r in self.reading.refused[:3]]
-        more = len(self.reading.refused) - len(said)
-        return f"not understood: {'; '.join(said)}" + (f"; and {more} more" if more > 0 else "")
+        lines = [f"{name}:{r.line}: {r.why}" for r in self.reading.refused[:3]]
+        more = len(self.reading.refused) - len(lines)
+        return f"not understood: {'; '.join(lines)}" + (f"; and {more} more" if more > 0 else "")
 
     # -- running -----------------------------------------------------------------------------------------
 

@@ -57,12 +57,12 @@ class ReviewBackend(Backend):
     def check(self, job: Job) -> tuple[Diagnostic, ...]:
         try:
             record, path = _read(job)
-            said = signed(path, record, _keys(job))
+            signature = signed(path, record, _keys(job))
         except Rejected as error:
             return error.diagnostics
-        if not isinstance(said, str):
+        if not isinstance(signature, str):
             return ()
-        return (Diagnostic("REV104", f"the review does not count: {said}", record.span, Severity.WARNING),)
+        return (Diagnostic("REV104", f"the review does not count: {signature}", record.span, Severity.WARNING),)
 
     def files(self, job: Job) -> tuple[Path, ...]:
         """The record, its signature, the keys that may have signed it, and all files that were read."""
@@ -87,11 +87,11 @@ class ReviewBackend(Backend):
     def discharge(self, job: Job, folder: Path, limits: Limits) -> Report:
         try:
             record, path = _read(job)
-            said = signed(path, record, _keys(job))
+            signature = signed(path, record, _keys(job))
         except Rejected as error:
             why = f"the review cannot be used: {told(job, error.diagnostics)}"
             return Report.alike(job, Verdict.ERROR, why, "avow review", self.version)
-        return Report(tuple(_settle(job, record, said, o) for o in job.obligations), "avow review", self.version)
+        return Report(tuple(_settle(job, record, signature, o) for o in job.obligations), "avow review", self.version)
 
 
 def record_name(job: Job) -> str | None:
@@ -138,7 +138,7 @@ def _read(job: Job) -> tuple[Record, Path]:
     return record, path
 
 
-def _settle(job: Job, record: Record, said: Opened | str | None, obligation: Obligation) -> Outcome:
+def _settle(job: Job, record: Record, signature: Opened | str | None, obligation: Obligation) -> Outcome:
     judged = next((j for j in record.clauses if j.clause == obligation.name), None)
     # A guarantee's own conclusion can only be worse than the review's: a rejected review accepts nothing.
     own = judged.conclusion if judged and judged.conclusion else record.conclusion
@@ -149,9 +149,9 @@ def _settle(job: Job, record: Record, said: Opened | str | None, obligation: Obl
         stale.append(moved)
     details = _details(record, judged)
     who = f"{record.reviewer} ({record.role}), {record.date}"
-    if isinstance(said, Opened):
-        who += f", signed {said.checked}"
-        details[SIGNED_BY] = said.key
+    if isinstance(signature, Opened):
+        who += f", signed {signature.checked}"
+        details[SIGNED_BY] = signature.key
     elsewhere = tuple(
         f"'{r.material}' was read and is not kept here: no change in it would be noticed"
         for r in record.read
@@ -166,8 +166,8 @@ def _settle(job: Job, record: Record, said: Opened | str | None, obligation: Obl
             summary += " (it had been rejected)"
         details["stale"] = stale
         hypotheses = ()
-    elif isinstance(said, str) and conclusion != "rejected":  # a rejection counts without a signature
-        verdict, summary, hypotheses = Verdict.UNKNOWN, f"the review does not count: {said}", ()
+    elif isinstance(signature, str) and conclusion != "rejected":  # a rejection counts without a signature
+        verdict, summary, hypotheses = Verdict.UNKNOWN, f"the review does not count: {signature}", ()
     elif conclusion == "rejected":
         why = (judged.remark if judged else "") or record.remarks or _against(record)
         verdict, summary = Verdict.REFUTED, f"rejected by {who}"

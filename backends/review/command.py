@@ -26,11 +26,11 @@ def stamp_command(system: str, node: str, method: str | None, as_json: bool, ren
 
     from .stamp import stamp
 
-    said = stamp(system_folder(system), node, method=method, renewed=renewed)
+    changes = stamp(system_folder(system), node, method=method, renewed=renewed)
     if as_json:
-        click.echo(document({"stamped": list(said)}))
+        click.echo(document({"stamped": list(changes)}))
         return 0
-    click.echo("\n".join(said) or "nothing to stamp: every digest is as it should be")
+    click.echo("\n".join(changes) or "nothing to stamp: every digest is as it should be")
     return 0
 
 

@@ -50,10 +50,10 @@ def signed(path: Path, record: Record, trusted: Sequence[Path]) -> Opened | str 
         return f"{place.name}: {opened}"
     if not opened.key:
         return f"{place.name} bears no signature"
-    said = {"reviewer": record.reviewer, "role": record.role, "date": record.date}
+    stated = {"reviewer": record.reviewer, "role": record.role, "date": record.date}
     subjects = [{"name": path.name, "digest": {"sha256": text}}]
     if opened.statement.get("predicateType") != PREDICATE or opened.statement.get("subject") != subjects:
         return f"{place.name} is not a signature of this text: sign it again once it is read"
-    if opened.statement.get("predicate") != said:
+    if opened.statement.get("predicate") != stated:
         return f"{place.name} names another review than it signs"
     return opened
