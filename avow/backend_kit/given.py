@@ -92,7 +92,7 @@ def file_text(path: Path, absent: str, wrong: str, most: int) -> str:
         raise Rejected(Diagnostic(wrong, "not UTF-8 text", Span(str(path), line, 1, line, 2))) from None
 
 
-def told(job: Job, diagnostics: Sequence[Diagnostic], most: int = 5) -> str:
+def summarized(job: Job, diagnostics: Sequence[Diagnostic], most: int = 5) -> str:
     """Diagnostics in one line, for an outcome's summary, with places that are the same on every machine."""
     lines = [_line(job, d) for d in diagnostics[:most]]
     if len(diagnostics) > most:

@@ -100,7 +100,7 @@ class ComposeDocument:
     obligations: tuple[Settled, ...]
 
 
-def told(
+def to_document(
     composition: Composition, goals: Sequence[Goal], obligations: Sequence[Obligation], outcomes: Sequence[Outcome]
 ) -> ComposeDocument:
     """The document for a composition."""

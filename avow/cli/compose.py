@@ -21,7 +21,7 @@ from avow.base.verdict import Counterexample, Outcome, Verdict
 from avow.calculus.composition import Composition, compose
 from avow.calculus.derivation import Goal
 from avow.calculus.discharge import Bounds
-from avow.calculus.document import told
+from avow.calculus.document import to_document
 from avow.calculus.export import derived_contract
 from avow.calculus.notation import write_goal
 from avow.calculus.obligations import all_tasks, settle_each
@@ -132,7 +132,7 @@ def command(
             settled.append(outcome)
     outcomes = tuple(settled)
     if as_json:
-        click.echo(document(told(composition, chosen, obligations, outcomes)))
+        click.echo(document(to_document(composition, chosen, obligations, outcomes)))
     else:
         _listing(composition, chosen, obligations, outcomes)
     fails = (o.verdict is Verdict.REFUTED or o.details.get("induction") == "fails" for o in outcomes)

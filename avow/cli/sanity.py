@@ -29,7 +29,7 @@ from avow.formulas.finite import interpretation
 from avow.language.contract import Node
 from avow.sanity.analysis import analyse
 from avow.sanity.claims import Property
-from avow.sanity.document import SanityDocument, told
+from avow.sanity.document import SanityDocument, to_document
 from avow.sanity.results import Bounds, SanityResult
 from avow.solving.limits import from_seconds
 
@@ -64,7 +64,7 @@ def command(path: Path, nodes: tuple[str, ...], as_json: bool, everything: bool,
     with ThreadPoolExecutor(os.cpu_count()) as pool:  # Z3 lets other threads run while it searches
         results = [result for found in pool.map(settle, chosen) for result in found]
     if as_json:
-        click.echo(document(SanityDocument(tuple(map(told, results)))))
+        click.echo(document(SanityDocument(tuple(map(to_document, results)))))
     else:
         _listing(results, everything)
     return 1 if any(result.fails or result.verdict is Verdict.ERROR for result in results) else 0

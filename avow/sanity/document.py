@@ -79,7 +79,7 @@ class SanityDocument:
     results: tuple[Result, ...]
 
 
-def told(result: SanityResult) -> Result:
+def to_document(result: SanityResult) -> Result:
     """The document for one result."""
     asked, shown, span = result.asked, result.counterexample, result.asked.span
     conflicts = tuple(Conflict(clauses, _shown(example)) for clauses, example in result.conflicts)

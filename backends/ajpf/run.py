@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from avow.backend_kit.given import told
+from avow.backend_kit.given import summarized
 from avow.backend_kit.protocol import Job, Limits, Report
 from avow.base.diagnostics import Rejected
 from avow.base.verdict import Counterexample, Verdict
@@ -48,7 +48,7 @@ def settle(job: Job, folder: Path, limits: Limits, version: str) -> Report:
     try:
         setup = read(job)
     except Rejected as error:
-        why = f"the agent cannot be checked: {told(job, error.diagnostics)}"
+        why = f"the agent cannot be checked: {summarized(job, error.diagnostics)}"
         return Report.alike(job, Verdict.ERROR, why, ENGINE, version)
     run = _Run(setup, instances(job, setup), folder, limits)
     frame = run.frame()

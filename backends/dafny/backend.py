@@ -10,7 +10,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from avow.backend_kit.given import existing_file, file, file_path, schema, told
+from avow.backend_kit.given import existing_file, file, file_path, schema, summarized
 from avow.backend_kit.one_step import unsaid
 from avow.backend_kit.protocol import Backend, Job, Limits, OutsideCheck, Report, Tool, Translated
 from avow.base import process
@@ -141,7 +141,7 @@ class DafnyBackend(Backend):
             path, text = _implementation(job)
             generated = _generate(job)
         except Rejected as error:
-            return all_alike(Verdict.ERROR, told(job, error.diagnostics))
+            return all_alike(Verdict.ERROR, summarized(job, error.diagnostics))
         except NotExpressible as problem:
             return all_alike(Verdict.UNKNOWN, f"not covered: Dafny's counterpart is missing for {problem.what}")
         if not tool.present:

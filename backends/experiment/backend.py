@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
-from avow.backend_kit.given import file_path, told
+from avow.backend_kit.given import file_path, summarized
 from avow.backend_kit.one_step import unsaid
 from avow.backend_kit.protocol import Backend, Job, Limits, Report
 from avow.base.codec import document
@@ -71,7 +71,7 @@ class ExperimentBackend(Backend):
         try:
             experiment = read(job)
         except Rejected as error:
-            why = f"the experiment cannot be judged: {told(job, error.diagnostics)}"
+            why = f"the experiment cannot be judged: {summarized(job, error.diagnostics)}"
             return Report.alike(job, Verdict.ERROR, why, "avow experiment", self.version)
         outcomes, logs = [], {}
         for o in job.obligations:

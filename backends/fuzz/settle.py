@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TypeVar
 
-from avow.backend_kit.given import told
+from avow.backend_kit.given import summarized
 from avow.backend_kit.linked import recorded
 from avow.backend_kit.protocol import Job, Limits, Report
 from avow.base.codec import canonical, to_json
@@ -70,7 +70,7 @@ def settle(job: Job, limits: Limits) -> Report:
     except Unavailable as missing:
         return Report.unsealed(job, missing, TOOL, version)
     except Rejected as rejected:
-        return Report.alike(job, Verdict.ERROR, told(job, rejected.diagnostics), TOOL, version)
+        return Report.alike(job, Verdict.ERROR, summarized(job, rejected.diagnostics), TOOL, version)
     with tempfile.TemporaryDirectory(prefix="avow-fuzz-") as scratch:
         work = Work(reading, limits, Path(scratch).resolve())
         try:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from avow.backend_kit.given import told
+from avow.backend_kit.given import summarized
 from avow.backend_kit.protocol import Job, Limits, Report
 from avow.backend_kit.stepping import Stepping
 from avow.base.diagnostics import Diagnostic, Rejected
@@ -140,7 +140,7 @@ def settle(job: Job, limits: Limits) -> Report:
         work.settler.seed = limits.seed
         found = work.triples
     except Rejected as rejected:
-        return Report.alike(job, Verdict.ERROR, told(job, rejected.diagnostics), "weakest preconditions", version)
+        return Report.alike(job, Verdict.ERROR, summarized(job, rejected.diagnostics), "weakest preconditions", version)
     logs: dict[str, str] = {}
     shown: Mapping[str, Outcome] = {}
     if work.steps is not None:
@@ -282,7 +282,7 @@ def _holds(condition: Condition, settler: Settler, deadline: float) -> bool:
 
 
 def _total(outcome: Outcome) -> Outcome:
-    """A proof that stands also says, of the same program, that it has an output for every input."""
+    """A current proof also shows that the same program has an output for every input."""
     if outcome.verdict is not Verdict.PROVED:
         return outcome
     return replace(outcome, details={**outcome.details, OUTPUT_FOR_EVERY_INPUT: True})

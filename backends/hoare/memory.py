@@ -200,7 +200,7 @@ class Seen:
 
 
 class Runner:
-    """Runs a program step after step. `node` is the contract's own; a reading that cannot be run is told by
+    """Runs a program step after step. `node` is the contract's own; a reading that cannot be run is reported by
     NotEvaluable."""
 
     def __init__(self, node: Node, steps: Stepping, checked: Checked, wanted: Iterable[Clause]) -> None:

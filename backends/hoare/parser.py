@@ -275,7 +275,7 @@ class _Block:
 
 
 class Layout:
-    """One pass over the tokens of one program: `_OPEN`, `_CLOSE` and `_SEP` are put among them, as blocks are told by
+    """One pass over the tokens of one program: `_OPEN`, `_CLOSE` and `_SEP` are put among them, as blocks follow from
     indentation, as the paper prints its programs.
 
     - After THEN, ELSE and DO a block opens. Its statements start in the column of its first token; a line that starts

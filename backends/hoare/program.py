@@ -1,4 +1,4 @@
-"""A checked program: its statements over typed terms, and how its names stand for the contract's.
+"""A checked program: its statements over typed terms, and what its names mean in the contract.
 
 Program variables are free variables of role BOUND, which every part of the core prints and translates by bare name.
 """

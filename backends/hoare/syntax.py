@@ -178,7 +178,7 @@ class If:
 
 @dataclass(frozen=True, slots=True)
 class Match:
-    """``MATCH e WITH c(x, y) THEN … ELSE …``: the variables stand for the arguments in the first branch."""
+    """``MATCH e WITH c(x, y) THEN … ELSE …``: the variables name the arguments in the first branch."""
 
     subject: Expression
     constructor: Name

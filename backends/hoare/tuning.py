@@ -30,7 +30,7 @@ RUN_STEPS = 5_000
 """Statements after which a run is given up: some milliseconds, for programs that mostly take a few dozen."""
 
 LOOP_STATES = 4
-"""So many of a loop's last states are told of a run that was given up."""
+"""Last states of a loop that are shown for a run that was given up."""
 
 NESTING = 120
 """Nesting beyond which a program is refused: later passes recurse over it."""

@@ -200,7 +200,7 @@ def _candidates(
     triple: Triple, program: Program, wanted: tuple[t.Variable, ...]
 ) -> Iterator[Mapping[t.Variable, Value]]:
     """First the solver's: inputs from which a loop's first round changes nothing, or from which it is entered; then
-    guesses. What is said of loops passed before is only what their invariants say: each is tried by running."""
+    guesses. Of earlier loops only the invariants are known, so each guess is tried by running."""
     for loop in (s for s in statements(program.body) if isinstance(s, While)):
         for goal in (_no_change(loop), loop.condition):
             try:

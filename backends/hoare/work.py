@@ -177,7 +177,7 @@ def answering(job: Job) -> Callable[[Mapping[str, Value]], Mapping[str, Value]]:
 
 
 _COMMON = frozenset({Fraction(-1), Fraction(0), Fraction(1)})
-"""Numbers that stand in programs for reasons of their own."""
+"""Numbers that are common in programs and need not occur in the contract."""
 
 
 def other_numbers(program: Program, clauses: Iterable[Clause]) -> Iterator[Diagnostic]:

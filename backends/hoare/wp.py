@@ -117,7 +117,7 @@ def _statement(statement: Statement, post: t.Term, side: Conditions) -> t.Term:
 
 
 def fits(statement: Match, names: Iterable[t.Variable]) -> t.Term:
-    """That the subject was made by the pattern's constructor, from values that `names` stand for."""
+    """That the subject was made by the pattern's constructor, from the values of `names`."""
     return t.Compare("==", statement.subject, t.Construct(statement.constructor, tuple(names), statement.sort))
 
 
@@ -194,7 +194,7 @@ def updated(post: t.Term, target: t.Variable, arguments: tuple[t.Term, ...], val
 
 
 def _looked_up(part: t.Term, after: t.Variable, update: Update) -> t.Term:
-    """An atom about the function after the update, said of the function before."""
+    """An atom about the function after the update, as one about the function before."""
     if isinstance(part, t.Quantified | t.And | t.Or | t.Not | t.Implies | t.Iff) or part.sort != BOOL:
         return part
     inner = next((a for a in _applications(part, after) if not any(_applications(x, after) for x in a.arguments)), None)

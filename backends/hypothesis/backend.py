@@ -11,7 +11,7 @@ from fractions import Fraction
 from importlib import metadata
 from pathlib import Path
 
-from avow.backend_kit.given import told
+from avow.backend_kit.given import summarized
 from avow.backend_kit.protocol import Job, Limits, Report
 from avow.base.codec import document
 from avow.base.diagnostics import Diagnostic, Rejected
@@ -64,7 +64,7 @@ def settle(job: Job, folder: Path, limits: Limits) -> Report:
         return Report.unsealed(job, missing, "hypothesis", version)
     found = problems(job)
     if found:
-        return Report.alike(job, Verdict.ERROR, told(job, found), "hypothesis", version)
+        return Report.alike(job, Verdict.ERROR, summarized(job, found), "hypothesis", version)
     if callbacks.wanted(job):
         return callbacks.settle(job, limits, version)
     with tempfile.TemporaryDirectory(prefix="avow-") as scratch:

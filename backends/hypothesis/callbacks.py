@@ -16,7 +16,7 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
-from avow.backend_kit.given import told
+from avow.backend_kit.given import summarized
 from avow.backend_kit.programs.callbacks import SECOND, Driver, Event, Run, Silent, driver
 from avow.backend_kit.programs.cpython import Told
 from avow.backend_kit.protocol import Backend, Job, JudgedRun, Limits, Report
@@ -79,7 +79,7 @@ def settle(job: Job, limits: Limits, version: str) -> Report:
         work = _work(job, backend, limits)
         outcomes = work.outcomes()
     except Rejected as rejected:
-        report = Report.alike(job, Verdict.ERROR, told(job, rejected.diagnostics), "hypothesis", version)
+        report = Report.alike(job, Verdict.ERROR, summarized(job, rejected.diagnostics), "hypothesis", version)
         again: dict[str, object] = {RETRY: True} if isinstance(rejected, Silent) else {}
         return replace(report, outcomes=tuple(replace(o, details=dict(again)) for o in report.outcomes))
     outcomes = tuple(replace(o, of=Object.SOURCE, numbers="float64") for o in outcomes)

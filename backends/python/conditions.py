@@ -52,7 +52,7 @@ class Conditions:
     numbers: frozenset[Fraction]
     deadline: float
     combined: bool = False
-    """Rounded results are told apart also at sums and products of two numbers: a second try, which costs more."""
+    """Rounded results are distinguished also at sums and products of two numbers: a second try, which costs more."""
     settler: Settler = field(default_factory=Settler)
     scripts: dict[str, str] = field(default_factory=dict)
     """Name → SMT-LIB of what was proved: `unsat` means that it holds."""

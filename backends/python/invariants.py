@@ -1,6 +1,6 @@
 """What may hold whenever a loop's next turn is decided on: candidates, of which the largest inductive part stays.
 
-They come from comments (``# invariant: best <= Far``), from the guarantees (the output's name stands for a local, the
+They come from comments (``# invariant: best <= Far``), from the guarantees (the output's name becomes a local, the
 length of a sequence for how much of it is done), and from a few shapes that loops often have. A candidate costs a
 question or two; one that is wrong is dropped.
 """
@@ -26,7 +26,7 @@ _NUMBERS = (INTEGER, REAL)
 
 
 class Sequences:
-    """The node's sequence inputs: what stands for their lengths and elements."""
+    """The node's sequence inputs: the terms for their lengths and elements."""
 
     def __init__(self, node: Node, names: Iterable[str]) -> None:
         self.variables = tuple(node.input(name).variable for name in names)
@@ -95,7 +95,7 @@ def _readable(turn: Turn) -> dict[str, t.Term]:
 
 
 def _promised(loop: For, first: Turn, promised: Sequence[t.Term], known: Sequences) -> Iterator[Candidate]:
-    """A guarantee, said of what is done so far."""
+    """A guarantee as a claim about the iterations so far."""
     offsets = {view.sequence: view.start for view in _views(loop)}
     lengths = {pair[0]: offsets.get(v.name, 0) for v, pair in known.parts.items()}
     for formula in promised:
@@ -125,7 +125,7 @@ def _promised(loop: For, first: Turn, promised: Sequence[t.Term], known: Sequenc
 
 
 def _hash_text(formula: t.Term) -> str:
-    """A formula, told apart from others in few words."""
+    """A formula in few words that distinguish it from others."""
     return show_term(formula, "unicode").replace("\n", " ")[:120]
 
 

@@ -2,7 +2,7 @@
 
 Both readers take it from here, so that what is validated is what is proved. It is run on doubles, whose every
 bit is compared with CPython's, or on fractions. Every expression has a kind; conversions from int to float are written
-out; methods that a step calls stand in its place.
+out; methods that a step calls are inlined.
 """
 
 from __future__ import annotations

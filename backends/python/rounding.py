@@ -1,6 +1,6 @@
-"""IEEE 754 rounding to nearest, ties to even, said in linear arithmetic over the reals.
+"""IEEE 754 rounding to nearest, ties to even, in linear arithmetic over the reals.
 
-A double r that an operation rounds from the exact x is told by facts that every rounding has: it is near, it has the
+A double r that an operation rounds from the exact x is described by facts about every rounding: it is near, it has the
 sign, it passes no double on the way, and at each constant it falls to the side that the tie's rule gives. The facts
 are of rounding without a largest number; that nothing overflows is a condition of its own. They never exclude what
 IEEE gives; they may allow more.

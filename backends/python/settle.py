@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from typing import Any
 
-from avow.backend_kit.given import told
+from avow.backend_kit.given import summarized
 from avow.backend_kit.linked import Recorded, recorded, settled
 from avow.backend_kit.programs.cpython import Subject, ask, case_of
 from avow.backend_kit.programs.judging import Formula, Seen, meets, seen, started
@@ -52,7 +52,7 @@ def settle(job: Job, limits: Limits) -> Report:
     except Unavailable as missing:
         return Report.unsealed(job, missing, TOOL, version)
     except Rejected as rejected:
-        return Report.alike(job, Verdict.ERROR, told(job, rejected.diagnostics), TOOL, version)
+        return Report.alike(job, Verdict.ERROR, summarized(job, rejected.diagnostics), TOOL, version)
     if not job.every:
         return Report((), TOOL, version)
     try:

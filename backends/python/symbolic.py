@@ -86,7 +86,7 @@ class Run:
     exact: bool
     """Nothing is rounded."""
     thresholds: tuple[float, ...]
-    """Doubles at which a rounded result is told apart."""
+    """Doubles at which rounded results are distinguished."""
     gaps: tuple[Fraction, ...]
     """Numbers of the contract that may be no doubles."""
     candidates: Sequence[Candidate]

@@ -50,7 +50,7 @@ class Scope:
     bound: set[str] = field(default_factory=set)
     sequences: dict[str, program.View] = field(default_factory=dict)
     aliases: dict[str, Any] = field(default_factory=dict)
-    """Names that stand for a constant mapping: the parameters."""
+    """Names of a constant mapping: the parameters."""
 
 
 class Translator(Expressions):
@@ -232,7 +232,7 @@ class Translator(Expressions):
             made, completes = self.statement(statement)
             found += made
             if not completes:
-                return tuple(found), False  # what stands below is never reached
+                return tuple(found), False  # what follows is never reached
         return tuple(found), True
 
     def statement(self, statement: ast.stmt) -> tuple[list[program.Statement], bool]:

@@ -7,7 +7,7 @@ APART = 20
 """Cases beside which each REAL input is NaN and infinite, where that is possible."""
 
 BESIDE = 6
-"""Inputs that are said not to be passed by a rounding, besides its operands: a handful is what a step compares."""
+"""Inputs, besides its operands, of which it is stated that a rounding does not pass them: a step compares few."""
 
 COMBINED = 10
 """Numbers whose sums and products of two are thresholds on a second try: more would drown the solver."""
@@ -16,7 +16,7 @@ UNROLLED = 16
 """Turns of a loop over `range` of a constant that are run one by one, without an invariant: windows of filters."""
 
 INLINED_DEPTH = 8
-"""Calls within calls beyond which a step is refused; recursion is told at once."""
+"""Calls within calls beyond which a step is refused; recursion is reported at once."""
 
 MOST_NAMES = 4_000
 """Names of values in a symbolic run: a step of a hundred lines has some hundreds."""

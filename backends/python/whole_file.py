@@ -118,7 +118,7 @@ def _sorted(refused: list[Refusal]) -> list[Refusal]:
 
 
 def _statements(tree: ast.Module, class_name: str) -> Iterator[Refusal]:
-    """At the top of a file, and of a class in it, stands nothing that does something."""
+    """The top level of a file, and of a class in it, has no statement with an effect."""
     for statement in tree.body:
         match statement:
             case ast.Import() | ast.ImportFrom() | ast.FunctionDef() | ast.Pass():
@@ -250,7 +250,7 @@ def _imports(tree: ast.Module, file: Path) -> Iterator[Refusal]:
 
 
 def _used(tree: ast.Module) -> Iterator[Refusal]:
-    """A module's name stands for nothing but one of its parts that may be used."""
+    """A module's name is used only with one of its supported parts."""
     heads = {a.name.partition(".")[0] for part in ast.walk(tree) if isinstance(part, ast.Import) for a in part.names}
     plain: set[int] = set()
     for part in ast.walk(tree):

@@ -6,7 +6,7 @@ import contextlib
 from collections.abc import Mapping
 from pathlib import Path
 
-from avow.backend_kit.given import existing_file, file, schema, told
+from avow.backend_kit.given import existing_file, file, schema, summarized
 from avow.backend_kit.protocol import Backend, Job, Limits, Report
 from avow.base.codec import document
 from avow.base.diagnostics import Diagnostic, Rejected, Severity
@@ -89,7 +89,7 @@ class ReviewBackend(Backend):
             record, path = _read(job)
             signature = signed(path, record, _keys(job))
         except Rejected as error:
-            why = f"the review cannot be used: {told(job, error.diagnostics)}"
+            why = f"the review cannot be used: {summarized(job, error.diagnostics)}"
             return Report.alike(job, Verdict.ERROR, why, "avow review", self.version)
         return Report(tuple(_settle(job, record, signature, o) for o in job.obligations), "avow review", self.version)
 

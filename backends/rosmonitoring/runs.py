@@ -9,7 +9,7 @@ from dataclasses import replace
 from typing import Any
 
 from avow import __version__
-from avow.backend_kit.given import told
+from avow.backend_kit.given import summarized
 from avow.backend_kit.protocol import Job, Judged, JudgedRun, Limits, Report
 from avow.base.codec import to_json
 from avow.base.diagnostics import Diagnostic, Rejected
@@ -43,7 +43,7 @@ def discharge(job: Job, traces: Mapping[str, str], limits: Limits) -> Report:
     """As `Backend.discharge`, with these recordings."""
     found, faults = setup(job.system, job.node, job.method.options)
     if faults:
-        return Report.alike(job, Verdict.ERROR, told(job, faults), "avow monitor", __version__)
+        return Report.alike(job, Verdict.ERROR, summarized(job, faults), "avow monitor", __version__)
     refused = translate(found, [job.clause(o) for o in job.obligations]).refused
     if not traces:
         outcomes = tuple(_without_trace(job, found, refused, o) for o in job.obligations)

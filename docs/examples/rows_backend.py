@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from fractions import Fraction
 from pathlib import Path
 
-from avow.backend_kit.given import existing_file, file_path, told
+from avow.backend_kit.given import existing_file, file_path, summarized
 from avow.backend_kit.protocol import Backend, Job, Limits, Report
 from avow.base.codes import declare, register
 from avow.base.diagnostics import Diagnostic, Rejected
@@ -64,7 +64,7 @@ class Rows(Backend):
         try:
             rows = read(job)
         except Rejected as rejected:
-            return Report.alike(job, Verdict.ERROR, told(job, rejected.diagnostics), "rows", self.version)
+            return Report.alike(job, Verdict.ERROR, summarized(job, rejected.diagnostics), "rows", self.version)
         try:
             allowed = [row for row in rows if all(evaluate(a.formula, row) is True for a in job.node.assumptions)]
             outcomes = tuple(judged(job, o.id, o.name, allowed) for o in job.obligations)

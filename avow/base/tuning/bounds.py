@@ -1,5 +1,5 @@
-"""How far searches and enumerations go before they give up, which is then said: beyond a bound an answer
-is `unknown` or "not exhaustive", never a proof.
+"""How far searches and enumerations go before they give up. Beyond a bound, an answer is `unknown` or "not exhaustive",
+never a proof.
 """
 
 GAME_MEMORIES = 300
@@ -177,8 +177,8 @@ VALUES_LOOKED_AT = 500
 """So many values of one domain or column are looked at; a table may have a million."""
 
 GUARDS = 32
-"""Guards of a partial operation that are tried, two at a time, to give its condition: more stand at no place that a
-person wrote; what is not found is asked of the claim itself."""
+"""Guards of a partial operation that are tried, two at a time, as its condition. Nobody writes more at one place. If no
+guard gives the condition, the claim itself is checked."""
 
 COUNTS_GUESSED = 6
 """Numbers below which a counter of a program and one that its contract has are guessed to agree, beside the limits that

@@ -36,7 +36,7 @@ SOLVED_EFFORT = 2_000
 """For the values of variables that nothing restricts to finitely many, at each evaluation of a formula."""
 
 QUESTION_EFFORT = 10_000
-"""A question's effort where nothing else is said: as long as a person waits for one answer."""
+"""Default effort of a question: as long as a person waits for one answer."""
 
 SMALLER_MODEL_EFFORT = 150
 """For a model with small numbers, once there is one: a kindness to the reader, which must not cost more than the
@@ -137,8 +137,8 @@ CONFIRMING_EFFORT = 500
 """For a question that should only confirm an answer."""
 
 WITNESS_PATIENT_EFFORT = 300
-"""From this much effort on for one attempt, all that is known of the chosen constants is told: short attempts are
-quicker without."""
+"""From this much effort on, an attempt gets all known facts about the chosen constants. Short attempts are quicker
+without them."""
 
 CONFLICT_SEARCH_EFFORT = 1_000
 """For whether some set of guarantees can be met at every input: small sets are decided soon, or mostly not at all."""

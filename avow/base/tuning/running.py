@@ -105,7 +105,7 @@ DRIVEN_SECONDS = 60.0
 """Seconds for one run of a callback class, whose time is virtual: thousands of messages take one."""
 
 NUMBERS_AGAIN = 0.3
-"""How often a message that is generated has the numbers of an earlier one: robots come where they were told to go."""
+"""How often a message that is generated has the numbers of an earlier one: robots come where they were sent."""
 
 LONGEST_GAP = 60.0
 """Seconds between two messages that are generated: a longer time-out is none of a callback's."""

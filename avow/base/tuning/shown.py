@@ -2,7 +2,7 @@
 has those, too."""
 
 TOOL_WORDS = 160
-"""So much of a tool's own words stands in a suggestion, in characters: two lines."""
+"""Characters of a tool's own words in a suggestion: two lines."""
 
 TREND_RUNS = 24
 """Runs shown, the newest: so many columns fit beside each other."""
@@ -11,8 +11,8 @@ SOURCE_COLUMNS = 100
 """Columns of a source line that are shown around a fault: a terminal's width, less its margin."""
 
 OLDER_RECORDS = 2
-"""Records of an earlier state that a report keeps of each claim and method, the newest: what the method said before the
-claim or its subject changed, and once more where it was asked again for a new version of a tool. The ledger has all."""
+"""Newest earlier records of each claim and method in a report: the answer before the claim or the unit under test
+changed, and the one before a new version of a tool. The ledger has all records."""
 
 STEP_VARIABLES = 12
 """Variables shown of each step of a run: more fit in no line of a table."""
@@ -48,7 +48,7 @@ GATE_REASON = 240
 """Characters of a failing gate's reason on the terminal: three lines."""
 
 NODE_BOXES = 12
-"""So many guarantees of a node have a box each; more are grouped by where they stand."""
+"""Guarantees of a node that have a box each; more are grouped by their status."""
 
 CHANGES_UNFOLDED = 40
 """Longer groups are folded, but for what got worse."""
@@ -82,7 +82,7 @@ GUARANTEE_ROWS = 600
 """So many guarantees have a row of their own in the summary; beyond that each node's line counts them."""
 
 FINDING_CHARACTERS = 240
-"""Characters of a finding in the answer; all of it stands with the obligation."""
+"""Characters of a finding in the answer. The obligation has all of it."""
 
 PDF_OBLIGATIONS = 500
 """Obligations in the PDF: nobody turns more pages; all are in report.json, and the PDF says so."""
@@ -91,7 +91,7 @@ SHEET_LETTERS = 1400
 """Letters of assumptions and listed requirements for which the first printed sheet has room."""
 
 PDF_COLUMNS = 9
-"""Columns of a run that fit on a page; a wider one is told by its reason alone."""
+"""Columns of a run that fit on a page. For a wider run only the reason is shown."""
 
 COLOURED_CHARACTERS = 400_000
 """Characters of a file that are still coloured: colours triple a page, and nobody reads that much of it."""

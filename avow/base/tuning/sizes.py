@@ -43,7 +43,7 @@ CLAUSE_PARTS = 200_000
 """So many parts a clause may have, constants written out."""
 
 REFERENCES_AHEAD = 100
-"""Declarations that stand before what they refer to: so long a row of them, since following it recurses."""
+"""Longest chain of declarations before what they refer to, because following it recurses."""
 
 CONTRACT_BYTES = 4_000_000
 """A larger file is no contract: at forty bytes a line it has a hundred thousand lines."""

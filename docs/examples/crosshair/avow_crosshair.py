@@ -20,7 +20,7 @@ from typing import Any
 
 from avow_crosshair_harness import Unsaid, written
 
-from avow.backend_kit.given import told
+from avow.backend_kit.given import summarized
 from avow.backend_kit.programs.cpython import Subject, ask, case_of
 from avow.backend_kit.programs.judging import Formula, meets, seen
 from avow.backend_kit.protocol import Backend, Job, Limits, Report, Tool
@@ -105,7 +105,7 @@ class CrossHair(Backend):
         except Unavailable as missing:
             return Report.alike(job, Verdict.NOT_RUN, str(missing), "crosshair", version)
         except Rejected as rejected:
-            return Report.alike(job, Verdict.ERROR, told(job, rejected.diagnostics), "crosshair", version)
+            return Report.alike(job, Verdict.ERROR, summarized(job, rejected.diagnostics), "crosshair", version)
         if not tool.present:
             return Report.alike(job, Verdict.NOT_RUN, f"crosshair is not here: {_INSTALL}", "crosshair", version)
         outcomes, observed, log = looked(job, reading, level, limits)
