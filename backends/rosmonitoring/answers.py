@@ -97,7 +97,7 @@ def judge_part(
     tally.judged += 1
     if not truth:
         tally.broken += 1
-        said = f"{watched.said}, whatever the rest of the answer was"
+        said = f"{watched.statement}, whatever the rest of the answer was"
         wrong = monitor.violation(Fault.GUARANTEE, watched.clause.name, event, said, watched, values)
         found.append(replace(wrong, heard={n: at for part in parts.values() for n, at in part.heard.items()}))
 
@@ -229,7 +229,7 @@ def judge_answer(monitor: Monitor, asked: Asked, choices: Choices, found: list[V
     elif isinstance(verdict, Fault):
         tally.broken += 1
         tally.excused += verdict is Fault.EXCUSED
-        said = watched.said
+        said = watched.statement
         if verdict is Fault.EXCUSED:
             said += "; but an assumption does not hold"
         wrong = monitor.violation(verdict, watched.clause.name, asked.event, said, watched, cases[0])

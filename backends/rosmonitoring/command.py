@@ -29,7 +29,7 @@ from .configuration import of_system
 from .engine import Monitor
 from .judged import Recorder, ReportingMonitor
 from .lanes import Marks, signals, timeline
-from .observing import method_of, said
+from .observing import data_of, method_of
 from .options import origin
 from .session import Session, session, violation_json
 from .tuning import VIOLATIONS_SHOWN
@@ -132,7 +132,7 @@ def _configure(system: System, nodes: tuple[str, ...], path: Path) -> None:
     """Write ROSMonitoring's configuration. Raises Rejected."""
 
     setups = [monitor.setup for monitor in session(system, nodes).monitors]
-    _write(path, of_system([(setup, said(method_of(system, setup.node.name))) for setup in setups]))
+    _write(path, of_system([(setup, data_of(method_of(system, setup.node.name))) for setup in setups]))
     click.echo(f"{path}: {len(setups)} monitors")
 
 

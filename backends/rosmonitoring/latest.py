@@ -67,7 +67,7 @@ def _blamed(
     """The fault of a clause that does not hold, and the explanation; None if it cannot be decided."""
     if truth is None:
         return None
-    said = watched.said
+    said = watched.statement
     if watched.clause.kind is ClauseKind.ASSUMPTION:
         return Fault.ASSUMPTION, said
     for assumed in assumptions:

@@ -144,7 +144,7 @@ def _wires(
 
 
 def _check_words(
-    way: FieldPath, wire: Scalar, sort: s.EnumSort, holder: Message, names: Mapping[str, str], said: bool
+    way: FieldPath, wire: Scalar, sort: s.EnumSort, holder: Message, names: Mapping[str, str], given: bool
 ) -> None:
     if wire.name not in INTEGERS:
         return
@@ -159,7 +159,7 @@ def _check_words(
             meant = f"by its name in {holder.name} it means {own[number]}"
             raise Wrong(f"{number} is to mean {element}, and {meant}", "values", number, hint=hint)
     left = [member for member in sort.members if member not in names.values()]
-    if left and not said:
+    if left and not given:
         raise Wrong(
             f"{shown(way)} is {wire}, and no number is known for {', '.join(left)}",
             "values",
@@ -351,19 +351,19 @@ def method_of(system: System, node: str) -> Located | None:
     return next((m.options for m in system.plan.node(node).methods if m.backend == NAME), None)
 
 
-def said(options: Located | None) -> Mapping[str, Any]:
+def data_of(options: Located | None) -> Mapping[str, Any]:
     """The data of a method's options; empty if there is no such method."""
     return options.data if options is not None and isinstance(options.data, Mapping) else {}
 
 
 def mapping_of(options: Located | None) -> Mapping[str, Any]:
-    found = said(options).get("mapping")
+    found = data_of(options).get("mapping")
     return found if isinstance(found, Mapping) else {}
 
 
 def recordings(options: Located | None) -> dict[str, str]:
     """The traces that a method names, in order, each with its digest if the plan has it, otherwise an empty text."""
-    named = said(options).get("traces")
+    named = data_of(options).get("traces")
     found: dict[str, str] = {}
     for entry in named if isinstance(named, list) else ():
         match entry:

@@ -124,7 +124,7 @@ def setup(
     for name, told in read_from_inputs(work.rules, work.mapping()):
         work.fault(f"it is read from the message that gives {told}", name, hint="name what the node publishes")
     filtered = work.filtered()
-    data = observing.said(options)
+    data = observing.data_of(options)
     named = tuple((_called(system, node, topic), topic.ros_type) for topic in node.topics)
     made = Setup(
         node, work.rules, work.hidden, str(data.get("when", "outputs")), known, work.answers(data.get("answers")),
@@ -256,7 +256,7 @@ class _Work:
 
     def filtered(self) -> frozenset[str]:
         """The topics of the outputs that are filtered: messages must carry these."""
-        names = observing.said(self.options).get("filter", ())
+        names = observing.data_of(self.options).get("filter", ())
         outputs = {n: r for n, r in self.rules.items() if n.startswith("out.") and isinstance(r, Fields | Choice)}
         for at, name in enumerate(names):
             if name not in outputs:

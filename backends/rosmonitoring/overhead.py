@@ -31,7 +31,7 @@ class Runs:
 
 def overheads(job: Job) -> tuple[str, tuple[Diagnostic, ...]]:
     """The report's text on the cost of the monitors, and the errors in the tables that the plan names."""
-    said: list[str] = []
+    costs: list[str] = []
     wrong: list[Diagnostic] = []
     for at, entry in enumerate(job.options.get("overhead", ())):
         span = job.method.options.at("overhead", at)
@@ -39,13 +39,13 @@ def overheads(job: Job) -> tuple[str, tuple[Diagnostic, ...]]:
         try:
             if path is None or not path.is_file():
                 raise ValueError("there is no such file in the system's folder")
-            said.append(_told(entry, _read(path), job.node.name))
+            costs.append(_summary(entry, _read(path), job.node.name))
         except ValueError as error:
             wrong.append(Diagnostic("MON108", f"overhead: {entry['data']}: {error}", span))
-    return "; ".join(said), tuple(wrong)
+    return "; ".join(costs), tuple(wrong)
 
 
-def _told(entry: Mapping[str, Any], found: tuple[tuple[str, ...], Mapping[str, Runs]], node: str) -> str:
+def _summary(entry: Mapping[str, Any], found: tuple[tuple[str, ...], Mapping[str, Runs]], node: str) -> str:
     """``55.8 s to the door without monitors, 55.9 s (+0.2 %) with all of them; …``"""
     places, runs = found
     bare = runs[NONE]

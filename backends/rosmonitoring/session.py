@@ -74,9 +74,9 @@ def _report_withheld(monitors: Iterable[Monitor], counts: Mapping[str, int]) -> 
     the filter met the guarantees, and the record is no evidence about the node."""
     for monitor in monitors:
         for topic in sorted(monitor.setup.filtered):
-            said, passed = counts.get(raw(topic), 0), counts.get(topic, 0)
-            if said > passed:
-                reason = f"{said - passed} of {said} messages of {topic} were withheld by a filter"
+            published, passed = counts.get(raw(topic), 0), counts.get(topic, 0)
+            if published > passed:
+                reason = f"{published - passed} of {published} messages of {topic} were withheld by a filter"
                 monitor.backwards = monitor.backwards or reason
 
 

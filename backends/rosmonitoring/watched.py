@@ -260,7 +260,7 @@ class Watched:
     """Its memory, if it speaks of other steps."""
 
     @property
-    def said(self) -> str:
+    def statement(self) -> str:
         """The clause, for people."""
         return self.clause.sentence or self.clause.text or show_term(self.clause.formula, "unicode")
 
