@@ -118,6 +118,13 @@ PLAN_CODES = register(
         warning=True,
     ),
     declare(
+        "PLAN137",
+        "excluded value",
+        "An assumption about one input never allows a value that `scenario.domains` gives to it: no run has it.",
+        "Leave the value out, or correct the assumption.",
+        warning=True,
+    ),
+    declare(
         "PLAN121",
         "types clash",
         "An output and the input that it would feed have different types.",

@@ -118,7 +118,7 @@ def explored(machine: Machine, name: str, formula: Property, bounds: Bounds, dee
         text = f"the system cannot take a first step: {found.cannot_start.text()}"
         verdict = Verdict.REFUTED if found.cannot_start.genuine else Verdict.UNKNOWN
         return Answer(verdict, text, Counterexample(explanation=text), bound=_bound(found))
-    within = restrictions(found.machine.world)
+    within = restrictions(found.machine.world, found.machine.given)
     if done and not machine.short:
         machine.look_for_cuts(until(bounds.effort))
     if done and not machine.short:

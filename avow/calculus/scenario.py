@@ -5,27 +5,30 @@ The scenario restricts which values are *tried*; whether a guarantee holds for t
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from fractions import Fraction
 
-from avow.base.diagnostics import Rejected
+from avow.base.diagnostics import Diagnostic, Rejected, Severity
 from avow.base.plain import exact, listed
 from avow.base.records import dataclass
 from avow.base.tuning.bounds import SMALL_TABLE, VALUES_OF_A_PORT
 from avow.base.tuning.shown import DOMAIN_VALUES
 from avow.base.verdict import Hypothesis, bound
-from avow.calculus.variables import Frame
+from avow.calculus.variables import Frame, frame
 from avow.evaluation.compiler import combinations
 from avow.evaluation.evaluate import NotEvaluable, evaluate, finite_values
 from avow.formulas.finite import Ranges
+from avow.formulas.formula import free_variables
+from avow.formulas.temporal.ages import CLOCK
 from avow.formulas.temporal.clock import pace_of
 from avow.formulas.values import Data, FunctionValue, Opaque, Value
 from avow.language import sorts as s
 from avow.language.contract import Node, Port
-from avow.language.terms import Variable
+from avow.language.subterms import histories
+from avow.language.terms import Term, Variable
 from avow.system.names import ports_named
-from avow.system.plan import STEP_LENGTH, Scenario
+from avow.system.plan import STEP_LENGTH, Scenario, System
 
 Point = tuple[Value, ...]
 
@@ -191,6 +194,13 @@ class World:
             raise CannotRun("a function's table is empty, and nothing else says what its values may be")
         return (unused or list(known))[0]
 
+    def allows(self, formula: Term, port: Port, text: str) -> bool:
+        """Whether an assumption about one input may hold for a value."""
+        try:
+            return bool(evaluate(formula, {port.variable.qualified: self.parse(text, port.sort)}))
+        except (CannotRun, NotEvaluable):
+            return True
+
     def parse(self, text: str, sort: s.Sort) -> Value:
         """Parses a table cell or a value in RCL notation. Raises CannotRun."""
         from avow.language.load import parse_term
@@ -247,9 +257,27 @@ def ranges(whole: Frame, node: Node) -> Ranges:
     return Ranges(found.domains, inputs)
 
 
-def restrictions(world: World) -> tuple[Hypothesis, ...]:
+def excluded(system: System) -> Iterator[Diagnostic]:
+    """A warning at each assumption about one input that excludes values that `scenario.domains` gives to it."""
+    scenario, nodes = system.plan.scenario, system.contract.nodes
+    if scenario is None or not any(ports_named(name, nodes) for name in scenario.domains):
+        return
+    found, places = World(frame(system), scenario, {}), {e.port: e.assume_span for e in system.plan.environment}
+    for name, texts in scenario.domains.items():
+        for node, port in ports_named(name, nodes):
+            about = [(a.formula, places[a.port]) for a in found.frame.assumed if a.node == node.name]
+            for formula, span in (*about, *((clause.formula, clause.span) for clause in node.assumptions)):
+                if free_variables(formula) == {port.variable} and not histories(formula):
+                    never = [text for text in texts if not found.allows(formula, port, text)]
+                    if never:
+                        message = f"scenario.domains.{name} has {listed(never)}, which this assumption never allows"
+                        yield Diagnostic("PLAN137", message, span, Severity.WARNING)
+
+
+def restrictions(world: World, given: Sequence[Mapping[str, Value]] = ()) -> tuple[Hypothesis, ...]:
     """What a bounded check assumes about the values that the contracts leave open, by its name in the plan: a range
-    that leaves out values of its sort, a relation or function given by a table, and the sorts that are sampled."""
+    that leaves out values of its sort, a relation or function given by a table, and the sorts that are sampled.
+    `given`: the environment's inputs, one step each; a range has the values of these."""
     scenario, found = world.scenario, list[Hypothesis]()
     named = {**s.BUILTINS, **dict(world.frame.system.contract.types)}
     for name, texts in scenario.domains.items():
@@ -258,7 +286,13 @@ def restrictions(world: World) -> tuple[Hypothesis, ...]:
         everything = None if sort is None or isinstance(sort, s.FunctionSort) else finite_values(sort)
         if everything is None or sort is None or not set(everything) <= {world.parse(text, sort) for text in texts}:
             place = f"scenario.domains.{name}"
-            found.append(bound(place, f"{place}: it is one of {listed(texts, DOMAIN_VALUES)}"))
+            read = {world.frame.input(node.name, p.name).qualified for node, p in ports if p in node.inputs}
+            read |= {CLOCK.qualified} if name == STEP_LENGTH else set()
+            tried = {key(values[each]) for values in given for each in read if each in values}
+            out = [text for text in texts if tried and key(world.parse(text, sort or s.REAL)) not in tried]
+            left = f"; the assumptions leave out {listed(out, DOMAIN_VALUES)}" if out else ""
+            kept = listed([text for text in texts if text not in out], DOMAIN_VALUES)
+            found.append(bound(place, f"{place}: it is one of {kept}{left}"))
     for name, (table, columns) in scenario.interpret.items():
         place = f"scenario.interpret.{name}"
         found.append(bound(place, f"{place}: it is as {table}({', '.join(columns)}) has it"))

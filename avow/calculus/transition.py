@@ -93,6 +93,8 @@ class Machine:
         self.supposed: dict[str, Holds] = {}
         """The environment assumptions that mention cells."""
         self.environment = self._environment()
+        self.given = [values for choices in self.environment.values() for values in choices]
+        """The environment inputs that are tried."""
         self.memory = tuple(dict.fromkeys(edge.source for edge in self.graph.edges if edge.delayed))
         self.freed = {node: f"{node}.broken{CELL}" for node in self.frame.cells}
         """For each node with cells: whether an assumption has been broken; then its guarantees no longer apply."""

@@ -14,6 +14,7 @@ from avow.backend_kit.protocol import COMMON_OPTIONS, asking
 from avow.base.diagnostics import Diagnostic, Rejected, Severity, Span
 from avow.base.remembered import Shelf
 from avow.base.workspace import plans_within
+from avow.calculus.scenario import excluded
 from avow.language.load import check_paths
 from avow.pipeline.methods import method_backend, method_job
 from avow.pipeline.work import ENGINES
@@ -53,6 +54,7 @@ def of_plan(
         *without_words(system),
         *not_validated(system),
         *left_out(system),
+        *excluded(system),
         *never_read(system.plan),
     ]
     for plan in system.plan.nodes:

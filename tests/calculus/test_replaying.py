@@ -11,6 +11,7 @@ from avow.base.verdict import HypothesisKind, Outcome, Verdict
 from avow.calculus import model_checking
 from avow.calculus.ltl import Lasso
 from avow.calculus.node_outputs import Answerer
+from avow.calculus.scenario import excluded
 from avow.calculus.transition import Machine
 
 from .make import make, node, outcomes
@@ -78,6 +79,19 @@ def test_a_check_supposes_what_its_scenario_leaves_out(tmp_path: Path, more: str
     outcome = settle(tmp_path, "always count.n <= 3", more)
     assert outcome.verdict is Verdict.CHECKED
     assert told in [h.text for h in outcome.rests_on]
+
+
+def test_a_value_that_an_assumption_excludes_is_named(tmp_path: Path) -> None:
+    plan = PLAN.format(property="always count.n <= 3", more=", in.e: [0, 11, 60]", steps="")
+    plan += 'environment: {in.e: {assume: "in.e <= 10", because: test}}\n'
+    system = make(tmp_path, COUNTER.replace("  guarantee", "  assume ( in.e < 50 )\n  guarantee"), plan)
+    told = "scenario.domains.in.e: it is one of 0; the assumptions leave out 11, 60"
+    assert told in [h.text for h in outcomes(system)["R"].rests_on]
+    assert {d.code for d in excluded(system)} == {"PLAN137"}
+    assert [d.message.split(" has ")[1] for d in excluded(system)] == [
+        "11, 60, which this assumption never allows",
+        "60, which this assumption never allows",
+    ]
 
 
 def test_of_a_search_cut_short_also_its_length(tmp_path: Path) -> None:
