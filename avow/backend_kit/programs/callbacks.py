@@ -215,9 +215,8 @@ def driver(system: System, name: str) -> Driver:
     if faults:
         raise Rejected(*faults)
     known = require(definitions(plan.messages, plan.ros.distro))
-    if known.get(HEADER) is None:
-        header = _ROS1_HEADER if source.kind is Driving.ROSPY else _HEADER
-        known = Definitions({**known.messages, HEADER: header})
+    header = _ROS1_HEADER if source.kind is Driving.ROSPY else _HEADER
+    known = Definitions({HEADER: header, **known.messages})
     folders = [folder for folder in path.parents if folder.is_relative_to(root)]
     package = next((folder for folder in folders if (folder / "package.xml").is_file()), path.parent)
     ros = {
@@ -376,14 +375,13 @@ def _as_float(number: float, name: str) -> float:
 
 def fresh(wire: Wire, known: Definitions) -> Any:
     """The default of a field in a new message."""
-    match wire:
-        case Nested():
-            return code(wire, {}, known)
-        case Array(item=item, length=length):
-            return {"l": [fresh(item, known) for _ in range(length or 0)]}
-        case Scalar(name=name):
-            plain: dict[str, Any] = {"bool": False, "string": "", "wstring": ""}
-            return plain.get(name, {"f": (0.0).hex()} if name.startswith("float") else {"i": "0"})
+    if isinstance(wire, Array):
+        return {"l": [fresh(wire.item, known)] * (wire.length or 0)}
+    return code(wire, {} if isinstance(wire, Nested) else _ZERO.get(wire.name, 0), known)
+
+
+_ZERO: dict[str, Any] = {"bool": False, "string": "", "wstring": ""}
+_ZERO |= {name: {"sec": 0, "nanosec": 0} for name in ("time", "duration")}
 
 
 def shown(wire: Wire, data: Any, known: Definitions, kind: Driving) -> Any:
