@@ -294,7 +294,7 @@ class Paired:
         rows = asked.rows[low:high]
         for name in watched.paired:
             ages = batch.times[rows] - self._inputs[name].seconds[asked.ranges[name][0][low:high]]
-            tally.aging(name, float(ages.max()))
+            tally.aging(name, float(ages[held].max(initial=-1.0)))
         watched.asked = tuple(asked.ranges)
         pairing.asked += high - low
         for k in range(max(low, high - KEYS_KEPT), high) if watched.outputs else ():
