@@ -58,12 +58,13 @@ def thresholds(formulas: Iterable[Term], program: Iterable[Path], parameters: It
     few = _simple(own)[: tuning.CONSTANTS_COMBINED]
     calculated = {m for a in few for b in few for m in (a + b, a * b)}
     calculated |= {Fraction(math.isqrt(n.numerator)) for n in own if n.denominator == 1 and n > 1}
-    numbers = contract | own | {-number for number in own} | calculated
+    occurring = contract | own | {-number for number in own}
+    numbers = occurring | calculated
     small = sorted(contract)[: tuning.CONSTANTS_COMBINED]
-    around = {n + d for n in numbers - calculated | {Fraction(0)} for d in (-1, -_STEP, 0, _STEP, 1)}
+    around = {n + d for n in occurring | {Fraction(0)} for d in (-1, -_STEP, 0, _STEP, 1)}
     between = {(a + b) / 2 for a, b in itertools.pairwise(sorted(numbers | {Fraction(0)}))}
     combined = {a + b for a in small for b in small} | {a - b for a in small for b in small}
-    beside = {beside for n in numbers - calculated for beside in _neighbours(n)}
+    beside = {beside for n in occurring for beside in _neighbours(n)}
     far = {2 * max(numbers, default=Fraction(0)) + 100, min(numbers, default=Fraction(0)) - 100}
     whole, others = _lengths(contract | own), _lengths(calculated)
     lengths = others | {n + d for n in whole for d in ((-1, 0, 1) if len(whole) <= tuning.LENGTHS_BESIDE else (0,))}

@@ -11,6 +11,7 @@ from hoare.systems import make_job
 from avow.backend_kit.programs.samples import written
 from avow.backend_kit.protocol import Limits
 from avow.backends.hypothesis import BACKEND
+from avow.backends.hypothesis.thresholds import thresholds
 from avow.base.verdict import Verdict
 
 CONTRACT = """
@@ -70,6 +71,12 @@ def test_is_refuted(tmp_path: Path, formula: str, assume: str, subject: str) -> 
         (folder / name).write_text(text)
     (outcome,) = BACKEND.discharge(job, folder, Limits(seconds=60)).outcomes
     assert outcome.verdict is Verdict.REFUTED, outcome.summary
+
+
+def test_a_constant_that_can_also_be_calculated_keeps_its_neighbours(tmp_path: Path) -> None:
+    (tmp_path / "n.py").write_text("DEFAULT = 10\nSCALE = 1\n")
+    found = {float(number) for number in thresholds([], [tmp_path / "n.py"], []).numbers}
+    assert {9, 9.999, 10.001, 11, -9, -9.999, -10.001, -11} <= found
 
 
 def test_calculated_numbers_are_numbers_of_a_program() -> None:
