@@ -6,7 +6,7 @@ import shutil
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import click
@@ -17,7 +17,7 @@ from rich.text import Text
 from avow.base.codec import document
 from avow.base.diagnostics import Diagnostic, Rejected, refuse
 from avow.base.rendering import render
-from avow.base.verdict import Counterexample, Outcome, Verdict
+from avow.base.verdict import Counterexample, HypothesisKind, Outcome, Verdict
 from avow.calculus.composition import Composition, compose
 from avow.calculus.derivation import Goal
 from avow.calculus.discharge import Bounds
@@ -90,8 +90,9 @@ def command(
     requirements that have a formula.
 
     SYSTEM is a system's name or folder, or an .rcl file (without a plan, ports of one name are connected). Code 1 where
-    a side condition or requirement is refuted or not inductive, or a loop cannot start, 2 for bad input. A terminal's
-    stderr tells the answers as they come; who interrupts it gets those so far.
+    a side condition or requirement is refuted or not inductive, an answer is vacuous or rests on a vacuous one, or a
+    loop cannot start, 2 for bad input. A terminal's stderr tells the answers as they come; who interrupts it gets those
+    so far.
     """
     system = system_of(path)
     composition = compose(system)
@@ -121,7 +122,8 @@ def command(
         chosen = list({part.name: part for goal in chosen for part in goal.inner_first()}.values())
     prefixes = tuple(f"{goal.name}." for goal in chosen)
     every = (task.obligation for task in all_tasks(composition))
-    obligations = [o for o in every if not goals or (o.kind is Kind.COMPOSITION and o.name.startswith(prefixes))]
+    wanted = (*prefixes, "environment.")  # what an assumption that cannot hold supports is vacuous
+    obligations = [o for o in every if not goals or (o.kind is Kind.COMPOSITION and o.name.startswith(wanted))]
 
     asked = {o.name for o in obligations} | {f"{goal.name}.{c.about}" for goal in chosen for c in goal.conditions}
     with progress(len(asked)) as telling:
@@ -130,13 +132,27 @@ def command(
         for obligation, outcome in zip(obligations, settle_each(composition, obligations, bounds), strict=True):
             telling.tell(obligation.name, str(outcome.verdict))
             settled.append(outcome)
-    outcomes = tuple(settled)
+    outcomes = _without_what_is_hollow(obligations, settled)
     if as_json:
         click.echo(document(to_document(composition, chosen, obligations, outcomes)))
     else:
         _listing(composition, chosen, obligations, outcomes)
-    fails = (o.verdict is Verdict.REFUTED or o.details.get("induction") == "fails" for o in outcomes)
+    fails = (o.vacuous or o.verdict is Verdict.REFUTED or o.details.get("induction") == "fails" for o in outcomes)
     return 1 if any(fails) else 0
+
+
+def _without_what_is_hollow(obligations: list[Obligation], outcomes: list[Outcome]) -> tuple[Outcome, ...]:
+    """The outcomes; what rests on a vacuous one, directly or through others, is unknown."""
+    found = list(outcomes)
+    while True:
+        hollow = {o.local_id: o.name for o, outcome in zip(obligations, found, strict=True) if outcome.vacuous}
+        for at, outcome in enumerate(found):
+            below = [hollow[h.name] for h in outcome.rests_on if h.kind is HypothesisKind.CLAIM and h.name in hollow]
+            if below and outcome.verdict.supports and not outcome.vacuous:
+                text = f"rests on what is vacuous: {', '.join(below)}; otherwise {outcome.verdict}: {outcome.summary}"
+                found[at] = replace(outcome, verdict=Verdict.UNKNOWN, vacuous=True, summary=text)
+        if sum(outcome.vacuous for outcome in found) == len(hollow):
+            return tuple(found)
 
 
 _COLOURS = {"proved": "green", "justified": "cyan", "unknown": "yellow", "refuted": "red"}

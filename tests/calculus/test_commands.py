@@ -60,6 +60,17 @@ class Terminal(io.StringIO):
         return True
 
 
+@pytest.mark.parametrize("goal", [(), ("--goal", "whole")])
+def test_nothing_is_proved_from_an_environment_that_cannot_be(tmp_path: Path, goal: tuple[str, ...]) -> None:
+    plan = 'environment: {in.u: {assume: "in.u > 5 and in.u < previous(in.u, 9) - 1", because: test}}\n'
+    plan += "requirements: {R: {text: t, formula: a.x > 0, supported_by: [a]}}"
+    text = node("a", "u : REAL", "x : REAL", "G: out.x == in.u") + node("b", "x : REAL", "y : REAL", "A: in.x > 0")
+    code, out = invoke(compose_command, str(make(tmp_path, text, plan).plan.root), *goal)
+    assert code == 1
+    assert "rests on what is vacuous: environment.in.u" in out
+    assert "proved   " not in out
+
+
 def test_compose_tells_a_terminal_how_far_it_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     make(tmp_path, GOOD)
     for terminal, told in ((Terminal(), True), (io.StringIO(), False)):
