@@ -159,14 +159,15 @@ def _unreported(place: Workspace, cases: Sequence[Case]) -> tuple[str, ...]:
 def find_claim(
     cases: Sequence[Case], wanted: str, without_report: Sequence[str] = ()
 ) -> tuple[tuple[Case, ObligationView], ...]:
-    """The obligations with a name: a whole id, one without the system, ``agent.low``, or the end of one.
+    """The obligations with a name: a whole id, one without the system, ``agent.low``, ``robot/agent.low``, or the
+    end of one.
 
     Raises Rejected if there is none. `without_report`: systems without a report.
     """
     named = [(case, view) for case in cases for view in case.obligations]
     for test in (
         lambda view: view.id == wanted,
-        lambda view: wanted in (view.obligation.local_id, short(view.id)),
+        lambda view: wanted.removeprefix(f"{view.obligation.system}/") in (view.obligation.local_id, short(view.id)),
         lambda view: wanted and (view.id.endswith("/" + wanted) or view.obligation.digest.startswith(wanted)),
     ):
         found = tuple((case, view) for case, view in named if test(view))

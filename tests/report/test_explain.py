@@ -142,7 +142,8 @@ def unexplained(found: Case, made: dict[str, str]) -> set[str]:
         except Rejected:
             return False
 
-    names = marks(made) | {short(v.id) for v in found.obligations} | {m.name for m in found.methods}
+    claims = {short(v.id) for v in found.obligations}
+    names = marks(made) | claims | {f"{found.system}/{name}" for name in claims} | {m.name for m in found.methods}
     return {name for name in names if not known(unquote(name))}
 
 
