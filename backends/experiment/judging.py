@@ -81,7 +81,7 @@ def claim(clause: Clause, assumptions: Iterable[Clause], meanings: Iterable[Inte
     judged_terms = (formula, *(term for name, term in assumed.items() if name not in unseen))
     return Claim(
         ready(clause.name, formula),
-        tuple(ready(_text(condition), condition) for condition in _conditions(formula, assumed)),
+        tuple(ready(_named(condition, formula), condition) for condition in _conditions(formula, assumed)),
         _demands(formula),
         tuple(ready(name, term) for name, term in assumed.items() if name not in unseen),
         tuple(unseen),
@@ -200,6 +200,10 @@ def _dead(condition: Term, assumed: Mapping[str, Term]) -> bool:
 
 def _ports(formula: Term) -> set[str]:
     return {variable.qualified for variable in ports_of(formula)}
+
+
+def _named(condition: Term, formula: Term) -> str:
+    return _text(condition) if due(formula) is None else f"{_text(formula)} is due before the run ends"
 
 
 def _text(formula: Term) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from decimal import ROUND_CEILING, Context
 
 from avow.backend_kit.programs.judging import Formula
@@ -64,7 +64,8 @@ def guarantee(name: str, formula: Term, records: Records) -> Guarantee:
     else:
         used = tuple(v for v in response.outer if v in free_variables(response.full))
         full = Quantified(Quantifier.EXISTS, used, response.full) if used else response.full
-        found, parts = (judged(name, full, records),), [()]
+        told = f"{_shown(formula)} is due before the run ends"
+        found, parts = (replace(judged(name, full, records), text=told),), [()]
     none = [0] * len(found)
     return Guarantee(judged(name, formula, records), found, tuple(parts), none, list(none))
 

@@ -313,7 +313,9 @@ def test_a_run_of_several_steps_is_one_trial(tmp_path: Path) -> None:
 
 
 def test_a_run_that_ends_before_its_answer_is_due_is_no_trial(tmp_path: Path) -> None:
-    assert settle(job(tmp_path, WITHIN, runs_of(*["10 00"] * 30), steps=True, **DETECTION)).vacuous
+    outcome = settle(job(tmp_path, WITHIN, runs_of(*["10 00"] * 30), steps=True, **DETECTION))
+    assert outcome.vacuous
+    assert outcome.summary.endswith("in.person → within[2 steps](out.detected) is due before the run ends")
 
 
 def test_what_speaks_of_other_steps_asks_for_runs(tmp_path: Path) -> None:
