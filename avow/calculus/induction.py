@@ -149,12 +149,13 @@ def _run(values: Mapping[Variable, Value], length: int, claim: str) -> Counterex
     for earlier in range(length - 1, -1, -1):
         shown: dict[str, str] = {}
         for variable, value in sorted(values.items(), key=lambda item: item[0].qualified):
-            if CELL in variable.name:
+            clock = variable.name.startswith(f"dt{CELL}")
+            if CELL in variable.name and not clock:
                 continue  # cells follow from the earlier steps, which are shown
             base, times = variable.name, 0
             while base.endswith(BEFORE):
                 base, times = base.removesuffix(BEFORE), times + 1
-            name = f"in.{base}" if variable.role is Role.INPUT else base
+            name = "dt" if clock else f"in.{base}" if variable.role is Role.INPUT else base
             fixed = isinstance(variable.sort, FunctionSort) and times == 0
             if times == earlier or (fixed and variable.role is Role.INPUT):
                 shown[name] = show(value)

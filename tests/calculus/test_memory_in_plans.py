@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
 from pathlib import Path
 
 import pytest
@@ -227,8 +228,16 @@ def test_one_nodes_pace_bounds_no_step_that_another_counts(
     assert found.verdict is verdict, found.summary
 
 
-def test_where_paces_differ_no_number_of_steps_is_a_number_of_all_nodes_steps(tmp_path: Path) -> None:
+def test_a_run_that_breaks_a_limit_in_seconds_shows_the_times(tmp_path: Path) -> None:
+    text = PULSE % "at most 100 ms" + SLOW % "steps( at most 100 ms )"
+    shown = required(tmp_path, text, "a.v -> within[299 ms](b.w)").counterexample
+    assert shown is not None
+    assert all(0 < Fraction(dict(step)["dt"]) <= Fraction(1, 10) for step in shown.trace[1:])
+
+
+@pytest.mark.parametrize("limit", ["3 steps", "300 ms"])
+def test_where_paces_differ_no_number_of_steps_is_a_number_of_all_nodes_steps(tmp_path: Path, limit: str) -> None:
     text = PULSE % "every 100 ms" + SLOW % "steps( every 1 s )"
-    found = required(tmp_path, text, "a.v -> within[3 steps](b.w)")
+    found = required(tmp_path, text, f"a.v -> within[{limit}](b.w)")
     assert found.verdict is Verdict.UNKNOWN
     assert "a and b declare different `steps(…)`" in found.summary

@@ -157,7 +157,7 @@ class Records:
         if term.limit is None:
             return None
         if not term.limit.steps:
-            raise Unsaid(f"`{term.operator}` with a limit in seconds", term.span)
+            raise Unsaid(self.apart or f"`{term.operator}` with a limit in seconds", term.span)
         return term.limit.amount
 
     def _latest(self, term: t.History, holds: t.Term, began: t.Term, relation: str, amount: t.Literal) -> t.Term:

@@ -99,13 +99,13 @@ def one_pace(nodes: Iterable[Node]) -> bool:
 
 
 def other_paces(nodes: Sequence[Node]) -> tuple[frozenset[str], str]:
-    """The nodes whose pace does not bound the steps of every node that counts its steps; and why limits in steps are
-    about different steps in different nodes, if they are."""
+    """The nodes whose pace does not bound the steps of every node that counts its steps; and why limits are about
+    different steps in different nodes, if they are."""
     paces = {node.name: pace for node in nodes if (pace := pace_of(node)) is not None}
     counting = [n.name for n in nodes if any(counts_steps(clause.formula) for clause in n.clauses)]
     counted = {paces.get(name) for name in counting}
     others = frozenset(name for name, pace in paces.items() if counted - {pace})
-    apart = counting and (not one_pace(nodes) or len(counted - {None}) > 1)
+    apart = not one_pace(nodes) or (counting and len(counted - {None}) > 1)
     return others, f"{' and '.join(sorted(paces))} declare different `steps(…)`" if apart else ""
 
 
