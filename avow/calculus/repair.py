@@ -99,8 +99,8 @@ def offers(frame: Frame, hypotheses: Mapping[str, t.Term], goal: t.Term, places:
 
 def _offer(frame: Frame, known: Mapping[str, t.Term], goal: t.Term, place: Place) -> Offer | None:
     found = _eliminated(known, goal, place)
-    if found is None or not found[1]:
-        # If elimination fails, or succeeds only without some hypothesis, try every value, if they are few.
+    if found is None or not found[1] or any(isinstance(part, t.Conditional) for part in subterms(found[0])):
+        # If elimination fails, succeeds only without some hypothesis, or writes `if`: try every value, if they are few.
         tried = _enumerated(known, goal, tuple(place.ports), OFFER_STEP_EFFORT)
         found = tried if tried is not None and (tried[1] or found is None) else found
     if found is None:

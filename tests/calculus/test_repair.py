@@ -163,6 +163,12 @@ def test_a_requirement(tmp_path: Path) -> None:
     assert kinds["guarantee"]["of"] == "a"
 
 
+def test_a_requirement_with_memory_gets_a_plain_condition(tmp_path: Path) -> None:
+    plan = "requirements: {R: {text: t, formula: 'historically[2 steps](a.u) -> a.x'}}"
+    outcome = outcomes(make(tmp_path, node("a", "u : BOOL", "x : BOOL", "G: out.x <=> held[2 steps](in.u)"), plan))["R"]
+    assert [o["clause"] for o in offered(outcome) if o["kind"] == "environment"] == ["assume ( in.u == FALSE )"]
+
+
 @pytest.mark.slow
 def test_deep_formulas_do_no_harm(tmp_path: Path) -> None:
     deep = "in.x == 0"
