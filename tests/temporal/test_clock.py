@@ -93,7 +93,9 @@ def disagreement(rng: random.Random, depth: int) -> str | None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize(
+    "seed", [*range(5), pytest.param(5, marks=pytest.mark.xfail(reason="KP-9 of qualification.yaml", strict=True))]
+)
 def test_cells_are_what_the_definitions_say(seed: int) -> None:
     rng = random.Random(seed)
     assert [found for _ in range(80) if (found := disagreement(rng, rng.choice((1, 2, 2, 3)))) is not None] == []
