@@ -99,9 +99,9 @@ INSTEAD = {
     "avow requirements FILE": "avow requirements requirements.csv",
     "avow review sign SYSTEM NODE --key FILE": f"{KEYED} && {STAMPED}"
     " && avow review sign thermostat thermometer --key my.key",
-    "avow review sign FOLDER NODE --key KEY [--method ID]": f"{KEYED} && {STAMPED}"
+    "avow review sign SYSTEM NODE --key KEY [--method ID]": f"{KEYED} && {STAMPED}"
     " && avow review sign contracts/thermostat thermometer --key my.key --method review",
-    "avow review stamp FOLDER NODE [--method ID] [--renewed DATE]": f"{STAMPED}"
+    "avow review stamp SYSTEM NODE [--method ID] [--renewed DATE]": f"{STAMPED}"
     " && avow review stamp contracts/thermostat thermometer --method review --renewed 2026-11-22",
     "avow sanity --json": "avow sanity thermostat --json",
     "avow sign --report SYSTEM": SIGNED,
