@@ -299,8 +299,8 @@ def restrictions(world: World, given: Sequence[Mapping[str, Value]] = ()) -> tup
     for node in world.frame.system.contract.nodes:
         for port in (*node.inputs, *node.outputs):
             role = "in" if port in node.inputs else "out"
-            given = {f"{role}.{port.name}", f"{node.name}.{port.name}"} & {*scenario.domains, *scenario.interpret}
-            if not given and port.sort not in world.domains and _is_sampled(port.sort):
+            named = {f"{role}.{port.name}", f"{node.name}.{port.name}"} & {*scenario.domains, *scenario.interpret}
+            if not named and port.sort not in world.domains and _is_sampled(port.sort):
                 text = f"scenario: {node.name}.{port.name} has one of the values that are tried"
                 found.append(bound(f"scenario.values.{node.name}.{port.name}", text))
     if world.frame.timed and STEP_LENGTH not in scenario.domains:
