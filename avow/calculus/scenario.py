@@ -289,6 +289,7 @@ def restrictions(world: World, given: Sequence[Mapping[str, Value]] = ()) -> tup
             read = {world.frame.input(node.name, p.name).qualified for node, p in ports if p in node.inputs}
             read |= {CLOCK.qualified} if name == STEP_LENGTH else set()
             tried = {key(values[each]) for values in given for each in read if each in values}
+            tried = set() if isinstance(sort, s.FunctionSort) else tried  # its values are given point by point
             out = [text for text in texts if tried and key(world.parse(text, sort or s.REAL)) not in tried]
             left = f"; the assumptions leave out {listed(out, DOMAIN_VALUES)}" if out else ""
             kept = listed([text for text in texts if text not in out], DOMAIN_VALUES)
@@ -299,8 +300,8 @@ def restrictions(world: World, given: Sequence[Mapping[str, Value]] = ()) -> tup
     for node in world.frame.system.contract.nodes:
         for port in (*node.inputs, *node.outputs):
             role = "in" if port in node.inputs else "out"
-            named = {f"{role}.{port.name}", f"{node.name}.{port.name}"} & {*scenario.domains, *scenario.interpret}
-            if not named and port.sort not in world.domains and _is_sampled(port.sort):
+            ranged = {f"{role}.{port.name}", f"{node.name}.{port.name}"} & {*scenario.domains, *scenario.interpret}
+            if not ranged and port.sort not in world.domains and _is_sampled(port.sort):
                 text = f"scenario: {node.name}.{port.name} has one of the values that are tried"
                 found.append(bound(f"scenario.values.{node.name}.{port.name}", text))
     if world.frame.timed and STEP_LENGTH not in scenario.domains:
