@@ -22,8 +22,8 @@ from avow.language.contract import Clause, ClauseKind
 from avow.ros.bags import LIVE, publisher
 
 from . import answers
-from .latest import Doubts, SoFar, judge_latest, not_met, verdict_of
-from .memory import hear, overdue, soonest, watching
+from .latest import Doubts, SoFar, hear, judge_latest, not_met, overdue, pass_between, soonest, verdict_of
+from .memory import watching
 from .options import Setup, same_topic
 from .pace import SIMULATED, By, Clock, Passage, Timing
 from .pairing import NUMBER, Asked, Choices, Pairing, Ticks, backwards, ticks, time_of
@@ -239,6 +239,7 @@ class Monitor:
                 watched.memory.pop(name, None)
                 if source in values:
                     watched.memory[name] = values[source]
+        pass_between(self, self._timed, updated, time_of(event))
         self.settle_previous()
 
     @property

@@ -9,7 +9,8 @@ messages: if these are of several topics, a breach is undecided.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any
@@ -206,3 +207,39 @@ class Doubts:
         asked.needless = frozenset(inputs).difference(watched.names)
         self.pairing.ask(asked)
         return True
+
+
+def hear(remembering: Iterable[Watched], names: Iterable[str]) -> None:
+    """Messages of these variables have come."""
+    for watched in remembering:
+        if watched.steps is not None:
+            watched.steps.hears(names)
+
+
+def pass_between(monitor: Monitor, timed: Iterable[Watched], names: Mapping[str, bool], now: Fraction) -> None:
+    """Messages of these variables have come; for some clauses, they made no step."""
+    for watched in timed:
+        steps, about = watched.steps, not names.keys().isdisjoint(watched.names) and watched.clause.pace is None
+        if about and steps is not None and steps.answers and steps.stepped != monitor.events:
+            steps.between(watched.names, monitor.known(watched, None), monitor.supposed, now)
+
+
+def overdue(timed: Sequence[Watched], event: Mapping[str, Any]) -> list[tuple[Watched, Fraction]]:
+    """The clauses that silence has broken by the time of an event, with the time of the breach, in order of time (at
+    the same time: assumptions first); each is reported once."""
+    now = time_of(event) if timed else Fraction(0)
+    found: list[tuple[Watched, Fraction]] = []
+    for watched in timed:
+        assert watched.steps is not None
+        watched.steps.begins(now)
+        if (deadline := watched.steps.late(now)) is not None and not watched.steps.missed:
+            watched.steps.missed = watched.steps.awaits
+            watched.truth, watched.tally.published = False, watched.tally.published + 1
+            found.append((watched, deadline))
+    return sorted(found, key=lambda each: (each[1], each[0].clause.kind is not ClauseKind.ASSUMPTION))
+
+
+def soonest(timed: Sequence[Watched]) -> float:
+    """Silence breaks nothing before this time."""
+    left = (watched.steps.deadline for watched in timed if watched.steps is not None)
+    return min((math.nextafter(float(at), 0.0) for at in left if at is not None), default=math.inf)

@@ -6,32 +6,29 @@ incomplete), the memory is unknown until later steps determine it. Limits in sec
 
 from __future__ import annotations
 
-import math
 import numbers
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Collection, Iterable, Mapping, Sequence, Set
+from contextlib import suppress
+from dataclasses import replace
 from fractions import Fraction
-from itertools import product
 from typing import Any, NoReturn
 
-from avow.base.tuning.bounds import POINTS_OF_ARGUMENTS
 from avow.evaluation.evaluate import NotEvaluable, compile_counterexample, compile_term, free_names
-from avow.evaluation.running import Keeper, unnamed
+from avow.evaluation.running import Keeper
 from avow.formulas.formula import conjunction, free_variables
-from avow.formulas.temporal.ages import CLOCK, ELAPSED, Side
+from avow.formulas.temporal.ages import CLOCK
 from avow.formulas.temporal.cell import CELL, Cell, Unsaid
 from avow.formulas.temporal.clock import Timed, is_arrival, longest_limit
 from avow.formulas.temporal.responses import due, fulfilled, in_the_past, pending, responding
-from avow.formulas.values import FunctionValue, Value
+from avow.formulas.values import Value
 from avow.language.contract import Clause, ClauseKind
 from avow.language.printer import show_term
 from avow.language.sorts import BOOL, INTEGER, NATURAL, REAL
-from avow.language.subterms import histories, subterms, timed
-from avow.language.terms import Apply, History, Implies, Past, Quantified, Role, Term, Variable
+from avow.language.subterms import histories, timed
+from avow.language.terms import History, Implies, Past, Quantified, Role, Term, Variable
 
 from .options import Setup
-from .pace import Leeway
-from .pairing import time_of
+from .pace import Leeway, Silence, moments
 from .rules import Previous
 from .watched import Tally, Watched, trigger_of
 from .word import undetermined
@@ -54,76 +51,6 @@ class _Unknown:
 
 
 numbers.Rational.register(_Unknown)  # a Fraction of it reads its numerator
-
-
-Moments = Callable[[Mapping[str, Value]], Iterator[Value]]
-
-
-@dataclass(slots=True)
-class Silence:
-    """A clause with limits in seconds between steps, and when its steps were."""
-
-    holds: Mapping[Side, Callable[[Mapping[str, Value]], Value]]
-    """Whether it holds `ELAPSED` seconds after a step."""
-    breaks: tuple[Moments, ...]
-    """The numbers of seconds after a step at which its truth may change."""
-    period: Fraction | None
-    """For a clause that says that steps come periodically, the period in seconds."""
-    leeway: Leeway
-    latest: Fraction | None = None
-    """The time of its latest step."""
-    elapsed: Fraction = Fraction(0)
-    """The time from the latest step to the next, which is being judged."""
-    reported: bool = False
-    """Whether a breach since the latest step has been reported."""
-    spared: Fraction | None = None
-    """If the step that is being judged came a little after a deadline: the time to it, `elapsed` to the deadline."""
-
-    def broken(self, memory: Mapping[str, Value]) -> Fraction | None:
-        """The time after the latest step at which silence breaks the clause, or None. Raises NotEvaluable."""
-
-        def at(side: Side, elapsed: Fraction) -> bool:
-            return bool(self.holds[side]({**memory, ELAPSED.qualified: elapsed}))
-
-        if not at(Side.AFTER, Fraction(0)):
-            return Fraction(0)
-        times = {Fraction(t) for each in self.breaks for t in each(memory) if isinstance(t, int | Fraction)}
-        for time in sorted(t for t in times if t > 0):
-            if not at(Side.AT, time) or not at(Side.AFTER, time):
-                return time
-        return None
-
-    def passed(self, now: Fraction) -> None:
-        """A step comes."""
-        self.elapsed = max(now - self.latest, Fraction(0)) if self.latest is not None else Fraction(0)
-        if self.period is not None and abs(self.elapsed - self.period) <= self.leeway.jitter:
-            self.elapsed = self.period
-
-
-def _moments(at: Term) -> Moments:
-    """The values of a term over memory; if it depends on quantified variables, at all remembered values of these and at
-    values that are not remembered. The returned function raises NotEvaluable."""
-    value = compile_term(at)
-    bound = sorted({v for v in free_variables(at) if v.role is Role.BOUND}, key=lambda v: v.name)
-    if not bound:
-        return lambda memory: iter((value(memory),))
-    applied = [t for t in subterms(at) if isinstance(t, Apply) and isinstance(t.function, Variable)]
-    places = {v: [(t.function, t.arguments.index(v)) for t in applied if v in t.arguments] for v in bound}
-
-    def each(memory: Mapping[str, Value]) -> Iterator[Value]:
-        known: list[list[Value]] = []
-        for variable in bound:
-            found = dict.fromkeys((unnamed(variable.sort),))
-            for function, place in places[variable]:
-                table = memory[function.qualified] if isinstance(function, Variable) else None
-                found |= dict.fromkeys(k[place] for k in table.table) if isinstance(table, FunctionValue) else {}
-            known.append(list(found))
-        for count, point in enumerate(product(*known)):
-            if count >= POINTS_OF_ARGUMENTS:
-                raise NotEvaluable("too many combinations of values are remembered")
-            yield value({**memory, **{v.name: p for v, p in zip(bound, point, strict=True)}})
-
-    return each
 
 
 class Memory:
@@ -149,14 +76,14 @@ class Memory:
         """One was never received: the response may be missing because its topic was not recorded."""
         self.stepped = 0
         """The event of its latest step."""
-        self.broke = False
+        self.broke = self.blind = False
         """It was broken there, which is reported; the silence that begins with it need not be reported."""
         self.awaits = self.missed = False
         """It requires a response within a limit, which did not come in time (reported) and has not come since."""
         self.judged: Mapping[str, Value] = {}
         """The valuation of that step."""
         self.silence = silence
-        self._arrivals = {v.qualified: _port_of(v) for v in arrivals}
+        self._arrivals = {v.qualified: _port_of(v.qualified) for v in arrivals}
         self._arrived = set[str]()
         self._keeper = Keeper(cells, leeway.instances)
         self._leeway = leeway
@@ -168,6 +95,15 @@ class Memory:
         plain = (BOOL, INTEGER, NATURAL, REAL)
         self._open = {c.before.qualified for c in cells if c.sort in plain} if whole else set[str]()
         """The state variables that may be unknown when a formula is evaluated: if they do not matter, it is decided."""
+        self._first, self.apart = dict(self._keeper.memory), False
+        """The memory before the first step; whether what it says of time depends on no step."""
+        read = {v.qualified for term in (formula, *(c.now for c in cells)) for v in free_variables(term)}
+        self._ports = {name: _port_of(name) for name in read if name.endswith(THEN)}
+        spoken = {c.before.qualified: free_variables(c.record) for c in cells if c.record is not None}
+        self._stepped = {name for name in spoken if any(v.name.endswith(THEN) for v in spoken[name])}
+        """The state variables that only steps change."""
+        self._then: dict[str, Any] | None = None
+        """From the first step on: what the latest step read of these, and the ports."""
 
     @property
     def unknown(self) -> str:
@@ -181,6 +117,7 @@ class Memory:
 
     def _around(self, values: Mapping[str, Value]) -> Mapping[str, Value]:
         """The values with the time since the step before, and the arrivals since."""
+        values = {**{name: values[port] for name, port in self._ports.items() if port in values}, **values}
         arrived = {name: port in self._arrived for name, port in self._arrivals.items()}
         if self.unsaid:
             missing: dict[str, Any] = {name: _Unknown() for name in self.unsaid if name not in values}
@@ -221,8 +158,10 @@ class Memory:
     def deadline(self) -> Fraction | None:
         """The time at which silence breaks the clause, unless a step comes before; None if it does not."""
         silence = self.silence
-        if silence is None or silence.latest is None or silence.reported:
+        if silence is None or silence.latest is None or silence.reported or (self.answers and self._then is None):
             return None
+        if silence.passed_by is not None:
+            return silence.passed_by
         memory = self._keeper.memory
         if self._breaks is None or self._breaks[0] is not memory:
             try:
@@ -230,7 +169,7 @@ class Memory:
             except (NotEvaluable, KeyError):
                 self._breaks = memory, None
         after = self._breaks[1]
-        return None if after is None else silence.latest + after
+        return None if after is None or (silence.asked and not after) else silence.latest + after
 
     def comes(self, now: Fraction) -> None:
         """A step comes at a time."""
@@ -245,17 +184,39 @@ class Memory:
         ):
             allowed = deadline - silence.latest
             if silence.elapsed > allowed:
-                silence.spared, silence.elapsed = silence.elapsed, allowed
+                silence.spared, silence.elapsed = silence.elapsed, max(allowed, Fraction(0))
         silence.latest = now if silence.latest is None else max(now, silence.latest)
-        silence.reported = False
+        silence.reported, silence.asked, silence.passed_by = False, False, None
+
+    def between(self, names: Collection[str], values: Mapping[str, Value], supposed: Set[str], now: Fraction) -> None:
+        """A message has come that makes no step: it changes what operators with limits in seconds remember. What it
+        demands at once is judged at the next step; a deadline that has passed remains."""
+        silence, first = self.silence, self._then is None
+        lacking = [name for name in names if name not in values or name in supposed]
+        if silence is None or (first and any(name.startswith(f"{Role.INPUT}.") for name in lacking)):
+            return
+        deadline = self.deadline
+        silence.passed(now)
+        silence.latest = now if silence.latest is None else max(now, silence.latest)
+        if not self.apart or (FIRST in self._cells if first else lacking or (self._stepped and not self._then)):
+            self.forget()
+            self.blind = True
+            return
+        unknown = {name: _Unknown() for name in lacking}
+        self._pass({**values, **unknown, **(self._then or {})}, self._stepped, first=first)
+        silence.asked, silence.passed_by = False, None
+        remains = deadline is not None and (deadline < now or self.deadline == silence.latest)
+        silence.asked, silence.passed_by = True, deadline if remains else None
 
     def restart(self) -> None:
         """A new run begins: pending responses are dropped."""
         self._keeper.restart()
         self._arrived.clear()
+        self._then = None
         self.lost = self.open = self.missed = False
         if self.silence is not None:
             self.silence.latest, self.silence.elapsed, self.silence.reported = None, Fraction(0), False
+            self.silence.asked, self.silence.passed_by = False, None
 
     def at(self, values: Mapping[str, Value]) -> dict[str, Any]:
         """A step's valuation, in which operations on unknown values cannot be evaluated."""
@@ -271,10 +232,19 @@ class Memory:
                 self.open = bool(self._waiting(valuation))
             except NotEvaluable:
                 self.open = True
-        self._keeper.memory = {n: v for n, v in valuation.items() if n in self._cells}
-        self._keeper.advance(self._around(values))
+        self._then = {name: valuation.get(name, _Unknown()) for name in (*self._ports, *self._stepped)}
+        self._pass(values)
         self._arrived.clear()
-        self._keeper.memory = {n: v for n, v in self._keeper.memory.items() if not isinstance(v, _Unknown)}
+
+    def _pass(self, values: Mapping[str, Any], kept: Collection[str] = (), *, first: bool = False) -> None:
+        """A step is over, or a message between steps, which leaves some state as it is (before the first step, also
+        what an output would change)."""
+        before = self._keeper.memory
+        self._keeper.memory = {n: v for n, v in self.at(values).items() if n in self._cells}
+        self._keeper.advance(self._around(values))
+        after = {n: v for n, v in self._keeper.memory.items() if not isinstance(v, _Unknown)}
+        kept = [n for n in before if n in kept or (first and n not in after and before[n] == self._first.get(n))]
+        self._keeper.memory = {**after, **{n: before[n] for n in kept}}
         self.lost = self.lost and self._keeper.memory.keys() != self._cells
 
     def step(self, watched: Watched, values: Mapping[str, Value], event: int, supposed: bool) -> bool | None:
@@ -284,7 +254,9 @@ class Memory:
             self.silence.elapsed, self.silence.spared = self.silence.spared, None
             if truth and watched.clause.kind is ClauseKind.GUARANTEE:
                 truth, watched.tally.reason = None, watched.tally.reason or self._leeway.late
-        self.broke = truth is False
+        if truth and self.blind:
+            truth, watched.tally.reason = None, watched.tally.reason or BLIND
+        self.broke, self.blind = truth is False, False
         if truth is False and self.mute:
             truth, watched.tally.reason = None, watched.tally.reason or MUTE
         if supposed:
@@ -299,8 +271,10 @@ class Memory:
         """A step was not seen."""
         self.lost, self.open = True, self._waiting is not None
         self._keeper.memory = {}
+        self._then = None if self._then is None else {}
 
 
+BLIND = "messages came between answers, and what it says of steps and of seconds depends on each other"
 MUTE = "a response is due of which no message was ever heard: its topic may not have been recorded"
 
 
@@ -310,24 +284,30 @@ def watch(clause: Clause, tally: Tally, setup: Setup) -> Watched:
     names = set[str]()
     if histories(formula):
         in_time = timed(formula) is not None
+        arrives = any(each.operator is Past.ARRIVED for each in histories(formula))
+        every, separate = in_time and (arrives or _answers_inputs(formula)), False
         never = _unsaid(formula) if in_time else frozenset[str]()
         asked = _once_said(formula) if never else formula
         records = Timed(longest=longest_limit((formula,)))
         silence: Silence | None = None
         try:
+            demanded, waiting = in_the_past(asked), pending(asked)
+            trigger = fulfilled(asked) or trigger_of(demanded)
+            if in_time and not every:
+                with suppress(Unsaid):
+                    demanded, separate = _apart(demanded), True
+                    trigger, waiting = trigger and _apart(trigger), waiting and _apart(waiting)
             if in_time:
-                positions = records.positions(asked)
+                positions = records.positions(demanded)
                 holds, breaks = records.instants(positions)
                 formula = positions.now
                 compiled = {side: compile_term(held) for side, held in holds.items()}
-                moved = tuple(map(_moments, breaks))
-                every = clause.pace.number if clause.pace is not None and clause.pace.relation == "==" else None
-                silence = Silence(compiled, moved, every, setup.leeway)
+                moved = tuple(map(moments, breaks))
+                regular = clause.pace.number if clause.pace is not None and clause.pace.relation == "==" else None
+                silence = Silence(compiled, moved, regular, setup.leeway)
             else:
                 formula = records.clause(formula)
-            trigger = fulfilled(asked) or trigger_of(in_the_past(asked))
             trigger = None if trigger is None else records.past(trigger, in_time=in_time)
-            waiting = pending(asked)
             waiting = None if waiting is None else records.past(waiting, in_time=in_time)
         except Unsaid as unsaid:
             raise NotEvaluable(f"the monitors have no {unsaid.reason}") from None
@@ -336,16 +316,14 @@ def watch(clause: Clause, tally: Tally, setup: Setup) -> Watched:
         steps = Memory(tuple(records.cells), formula, waiting, silence, arrivals, setup.leeway)
         response = responding(clause.formula)
         steps.awaits = response is not None and not response[0] and response[2].operator is Past.WITHIN
-        steps.every = in_time and (bool(arrivals) or _answers_inputs(clause.formula))
+        steps.every, steps.apart = every, separate
         names = {n for c in records.cells for n in free_names(c.now) - {p.name for p in c.parameters}}
-        names |= free_names(waiting) if waiting is not None else set()
-        names |= free_names(trigger) if trigger is not None else set()
-        names = (names | free_names(formula)) - {cell.before.qualified for cell in records.cells}
-        names = names - {CLOCK.qualified, ANSWERED.qualified, *(v.qualified for v in arrivals)} | set(
-            map(_port_of, arrivals)
-        )
+        for term in (formula, waiting, trigger):
+            names |= free_names(term) if term is not None else set()
+        names -= {CLOCK.qualified, ANSWERED.qualified, *(cell.before.qualified for cell in records.cells)}
+        names = set(map(_port_of, names))
         steps.unsaid = never
-        steps.alone = bool(arrivals) and names == set(map(_port_of, arrivals))
+        steps.alone = bool(arrivals) and names == {_port_of(v.qualified) for v in arrivals}
         if clause.pace is not None:  # its steps are the node's answers
             names = {n for n in setup.rules if n.startswith(f"{Role.OUTPUT}.") and n not in setup.hidden}
         # as it was written: the compiled formula has internal names
@@ -359,6 +337,34 @@ def watch(clause: Clause, tally: Tally, setup: Setup) -> Watched:
         tally,
         steps=steps,
     )
+
+
+THEN = f" then{CELL}"
+"""The end of the name of a port's value at the latest step."""
+FIRST = f"{Role.INPUT}.first step{CELL}"
+
+
+def _apart(term: Term, stepped: bool = False) -> Term:
+    """The formula in which operators over steps read the ports as they were at the latest step; those over instants
+    depend on every message. Raises Unsaid if they depend on each other."""
+    if isinstance(term, Variable) and stepped and term.role is not Role.BOUND:
+        return replace(term, name=term.name + THEN)
+    if isinstance(term, History):
+        if _over_instants(term):
+            edges = (Past.ROSE, Past.FELL, Past.CHANGED)
+            if stepped or any(not _over_instants(h) and h.operator not in edges for h in histories(term)):
+                raise Unsaid("steps among instants")
+            return term
+        first = term.operator is Past.PREVIOUS and free_variables(term.arguments[1])
+        if first or term.operator is Past.CHANGED or not free_variables(term):
+            raise Unsaid("what the first step is")
+        stepped = True
+    return term.rebuild(tuple(_apart(part, stepped) for part in term.children)) if term.children else term
+
+
+def _over_instants(term: History) -> bool:
+    unlimited = (Past.ONCE, Past.HISTORICALLY, Past.SINCE)
+    return term.operator in unlimited if term.limit is None else not term.limit.steps
 
 
 def triggers_of(setup: Setup, names: tuple[str, ...], *, every: bool = False) -> tuple[str, ...]:
@@ -429,34 +435,6 @@ def unmonitored(setup: Setup, clause: Clause) -> str:
     return ""
 
 
-def hear(remembering: Iterable[Watched], names: Iterable[str]) -> None:
-    """Messages of these variables have come."""
-    for watched in remembering:
-        if watched.steps is not None:
-            watched.steps.hears(names)
-
-
-def overdue(timed: Sequence[Watched], event: Mapping[str, Any]) -> list[tuple[Watched, Fraction]]:
-    """The clauses that silence has broken by the time of an event, with the time of the breach, in order of time (at
-    the same time: assumptions first); each is reported once."""
-    now = time_of(event) if timed else Fraction(0)
-    found: list[tuple[Watched, Fraction]] = []
-    for watched in timed:
-        assert watched.steps is not None
-        watched.steps.begins(now)
-        if (deadline := watched.steps.late(now)) is not None and not watched.steps.missed:
-            watched.steps.missed = watched.steps.awaits
-            watched.truth, watched.tally.published = False, watched.tally.published + 1
-            found.append((watched, deadline))
-    return sorted(found, key=lambda each: (each[1], each[0].clause.kind is not ClauseKind.ASSUMPTION))
-
-
-def soonest(timed: Sequence[Watched]) -> float:
-    """Silence breaks nothing before this time."""
-    left = (watched.steps.deadline for watched in timed if watched.steps is not None)
-    return min((math.nextafter(float(at), 0.0) for at in left if at is not None), default=math.inf)
-
-
 def _answers_inputs(formula: Term) -> bool:
     """Whether a clause requires something of later positions, by a trigger about inputs only."""
     found = due(formula)
@@ -487,9 +465,9 @@ def _once_said(formula: Term) -> Term:
     return replace(formula, arguments=tuple(conjunction((ANSWERED, part)) for part in formula.arguments))
 
 
-def _port_of(arrival: Variable) -> str:
-    """``in.scan``, for the variable that records whether a message of it has arrived."""
-    return f"in.{arrival.name.removeprefix('arrived ').removesuffix(CELL)}"
+def _port_of(name: str) -> str:
+    """``in.scan``, for the variable of its arrival or of its value at the latest step; a port is itself."""
+    return name.replace(".arrived ", ".", 1).removesuffix(THEN).removesuffix(CELL) if CELL in name else name
 
 
 def _quantified(term: Term) -> bool:

@@ -5,13 +5,20 @@ from __future__ import annotations
 import math
 import re
 from collections import deque
-from collections.abc import Iterable, Iterator, Mapping, Set
+from collections.abc import Callable, Iterable, Iterator, Mapping, Set
 from dataclasses import dataclass, field
 from enum import StrEnum
 from fractions import Fraction
+from itertools import product
 
-from avow.base.tuning.bounds import INSTANCES
-from avow.formulas.values import show
+from avow.base.tuning.bounds import INSTANCES, POINTS_OF_ARGUMENTS
+from avow.evaluation.evaluate import NotEvaluable, compile_term
+from avow.evaluation.running import unnamed
+from avow.formulas.formula import free_variables
+from avow.formulas.temporal.ages import ELAPSED, Side
+from avow.formulas.values import FunctionValue, Value, show
+from avow.language.subterms import subterms
+from avow.language.terms import Apply, Role, Term, Variable
 from avow.ros.bags import Event
 
 from .pairing import time_of
@@ -292,3 +299,77 @@ class Clock:
         except MappingError:
             return None
         return None if self._by is By.STAMP and not read else read  # ROS leaves 0 if nothing has set it
+
+
+Moments = Callable[[Mapping[str, Value]], Iterator[Value]]
+
+
+@dataclass(slots=True)
+class Silence:
+    """A clause with limits in seconds between steps, and when its steps were."""
+
+    holds: Mapping[Side, Callable[[Mapping[str, Value]], Value]]
+    """Whether it holds `ELAPSED` seconds after a step."""
+    breaks: tuple[Moments, ...]
+    """The numbers of seconds after a step at which its truth may change."""
+    period: Fraction | None
+    """For a clause that says that steps come periodically, the period in seconds."""
+    leeway: Leeway
+    latest: Fraction | None = None
+    """The time of its latest step."""
+    elapsed: Fraction = Fraction(0)
+    """The time from the latest step to the next, which is being judged."""
+    reported: bool = False
+    """Whether a breach since the latest step has been reported."""
+    spared: Fraction | None = None
+    """If the step that is being judged came a little after a deadline: the time to it, `elapsed` to the deadline."""
+    asked: bool = False
+    """A message has come since the latest step; `latest` is its time."""
+    passed_by: Fraction | None = None
+    """A deadline that had passed when it came."""
+
+    def broken(self, memory: Mapping[str, Value]) -> Fraction | None:
+        """The time after the latest step at which silence breaks the clause, or None. Raises NotEvaluable."""
+
+        def at(side: Side, elapsed: Fraction) -> bool:
+            return bool(self.holds[side]({**memory, ELAPSED.qualified: elapsed}))
+
+        if not at(Side.AFTER, Fraction(0)):
+            return Fraction(0)
+        times = {Fraction(t) for each in self.breaks for t in each(memory) if isinstance(t, int | Fraction)}
+        for time in sorted(t for t in times if t > 0):
+            if not at(Side.AT, time) or not at(Side.AFTER, time):
+                return time
+        return None
+
+    def passed(self, now: Fraction) -> None:
+        """A step comes."""
+        self.elapsed = max(now - self.latest, Fraction(0)) if self.latest is not None else Fraction(0)
+        if self.period is not None and abs(self.elapsed - self.period) <= self.leeway.jitter:
+            self.elapsed = self.period
+
+
+def moments(at: Term) -> Moments:
+    """The values of a term over memory; if it depends on quantified variables, at all remembered values of these and at
+    values that are not remembered. The returned function raises NotEvaluable."""
+    value = compile_term(at)
+    bound = sorted({v for v in free_variables(at) if v.role is Role.BOUND}, key=lambda v: v.name)
+    if not bound:
+        return lambda memory: iter((value(memory),))
+    applied = [t for t in subterms(at) if isinstance(t, Apply) and isinstance(t.function, Variable)]
+    places = {v: [(t.function, t.arguments.index(v)) for t in applied if v in t.arguments] for v in bound}
+
+    def each(memory: Mapping[str, Value]) -> Iterator[Value]:
+        known: list[list[Value]] = []
+        for variable in bound:
+            found = dict.fromkeys((unnamed(variable.sort),))
+            for function, place in places[variable]:
+                table = memory[function.qualified] if isinstance(function, Variable) else None
+                found |= dict.fromkeys(k[place] for k in table.table) if isinstance(table, FunctionValue) else {}
+            known.append(list(found))
+        for count, point in enumerate(product(*known)):
+            if count >= POINTS_OF_ARGUMENTS:
+                raise NotEvaluable("too many combinations of values are remembered")
+            yield value({**memory, **{v.name: p for v, p in zip(bound, point, strict=True)}})
+
+    return each
