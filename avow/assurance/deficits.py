@@ -25,6 +25,7 @@ _WORDS = {
     "bounded": ("requirement{s} within bounds only", "bounded", "Nothing is said outside what was searched."),
     "unowned": ("assumption{s} without owner or end", "without owner", "Nobody keeps them true, or they never end."),
     "sampled": ("claim{s} sampled, not proved", "sampled", "Other inputs and other runs may behave otherwise."),
+    "unanswered": ("claim{s} with unanswered inputs", "unanswered", "The evidence says nothing of these inputs."),
     "read": ("guarantee{s} on a person's reading only", "only read", "No tool has looked at them."),
     "single": ("guarantee{s} with one method only", "by one method", "An error of that tool would not be noticed."),
     "tied": (
@@ -87,6 +88,7 @@ def deficits(
         "models": [v.id for v in guarantees if v.id in relied and looked_at(relied[v.id]) is Object.MODEL],
         "unowned": [s.key for s in assumptions if not s.owned],
         "sampled": [v.id for v in leaves if _status(v, relied) in (Status.TESTED, Status.MONITORED)],
+        "unanswered": [v.id for v in leaves if any("unanswered" in e.entry.evidence.bound for e in v.counting)],
         "read": [v.id for v in guarantees if _status(v, relied) is Status.REVIEWED],
         "single": list(single),
         "tied": [v.id for v in guarantees if v.id in relied and _by_hand(v, relied[v.id])],
@@ -98,10 +100,8 @@ def deficits(
         "excused": [name for f in findings if f.how == "accepted" and not f.expired for name in f.obligations],
         "believed": [f"{v.id}: {r.method}" for v in views for r in v.records if r.run != run],
     }
-    remedies = {
-        "unrun": _install(unrun, missing),
-        "programs": _install([(v, method) for v in programs for method, _ in v.planned], missing),
-    }
+    silent = [(v, method) for v in programs for method, _ in v.planned]
+    remedies = {"unrun": _install(unrun, missing), "programs": _install(silent, missing)}
     return tuple(
         Deficit(key, len(claims), tuple(claims), words_of(key, len(claims)), _WORDS[key][2] + remedies.get(key, ""))
         for key, claims in found.items()

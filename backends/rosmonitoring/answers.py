@@ -187,13 +187,14 @@ def ask(
     """An answer, which is judged once the inputs that it may have answered are known."""
     assert monitor.pairing is not None
     pairing, now = monitor.pairing, time_of(event)
+    key = pairing.key(event, pairing.answers.output) if answer is None else answer.key
+    pairing.replied(watched, key)
     missing = [n for n in watched.names if n not in monitor.paired and (n not in values or n in monitor.supposed)]
     if missing:
         watched.tally.too_early(n for n in missing if n not in monitor.supposed)
         return
     own = tuple(n for n in speaks(monitor, watched) if n in values)
     inputs = tuple(n for n in asks(monitor, watched) if n in watched.paired or n in pairing.seen)
-    key = pairing.key(event, pairing.answers.output) if answer is None else answer.key
     heard = monitor.heard_of(watched.outputs) if answer is None else answer.heard
     known, places = {n: values[n] for n in own}, tuple({place for place, _ in heard.values()})
     watched.asked = inputs

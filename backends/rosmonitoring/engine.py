@@ -26,7 +26,7 @@ from .latest import Doubts, SoFar, hear, judge_latest, not_met, overdue, pass_be
 from .memory import watching
 from .options import Setup, same_topic
 from .pace import SIMULATED, By, Clock, Passage, Timing
-from .pairing import NUMBER, Asked, Choices, Pairing, Ticks, backwards, ticks, time_of
+from .pairing import NUMBER, Asked, Choices, Pairing, Replies, Ticks, backwards, ticks, time_of
 from .reading import Reader, reader
 from .rules import Choice, Constant, Fields, Previous, heard_through, of_latest
 from .tuning import OPEN_QUESTIONS, TOPICS_KEPT
@@ -239,6 +239,9 @@ class Monitor:
                 watched.memory.pop(name, None)
                 if source in values:
                     watched.memory[name] = values[source]
+        if self.pairing is not None and any(v.fault is Fault.ASSUMPTION and v.index == self.events for v in found):
+            for replies in self.pairing.replies.values():
+                replies.pardon(self.pairing.key(event, self.pairing.answers.input))
         pass_between(self, self._timed, updated, time_of(event))
         self.settle_previous()
 
@@ -441,6 +444,8 @@ class Monitor:
             self.clauses.setdefault(name, []).append(watched)
         if not triggers:
             self._constant.append(watched)
+        if self.pairing is not None and self.pairing.answers.by in ("key", "stamp", "call") and watched.paired:
+            self.pairing.replies[id(watched)] = Replies(watched)
         if clause.kind is ClauseKind.ASSUMPTION:
             self.assumptions.append(watched)
 

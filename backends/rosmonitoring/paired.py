@@ -276,6 +276,8 @@ class Paired:
         first = low if self._by == "latency" and pairing.waiting else max(low, first)
         pairing.input(name)
         keys = [*self._numbers] if self._by != "latency" else []
+        for k in range(low, first if keys else low):
+            pairing.heard(name, keys[one.ids[k]])
         for k in range(first, high):
             row = int(one.rows[k])
             event, key = self._batch.event(row), keys[one.ids[k]] if keys else None
@@ -297,6 +299,10 @@ class Paired:
             tally.aging(name, float(ages[held].max(initial=-1.0)))
         watched.asked = tuple(asked.ranges)
         pairing.asked += high - low
+        if self._by != "latency":
+            (name, (first, _)), keys = next(iter(asked.ranges.items())), [*self._numbers]
+            for k in self._inputs[name].ids[first[low:high]].tolist():
+                pairing.replied(watched, keys[k])
         for k in range(max(low, high - KEYS_KEPT), high) if watched.outputs else ():
             messages = {
                 name: tuple(self._place(name, one) for one in range(int(first[k]), int(last[k]) + 1))

@@ -26,7 +26,7 @@ from avow.ros.bags import ENVELOPE
 
 from .reading import Reader, at
 from .rules import FieldPath
-from .tuning import COMBINATIONS, KEYS_KEPT, LATEST_TIME, TICKS
+from .tuning import COMBINATIONS, KEYS_KEPT, LATEST_TIME, TICKS, UNANSWERED_KEPT
 from .wires import MappingError, NotANumber, exact, seconds
 
 if TYPE_CHECKING:
@@ -115,6 +115,54 @@ class InputMessage:
     """An answer was paired with it, as the only one of its key."""
 
 
+@dataclass(slots=True)
+class Replies:
+    """Which inputs of one guarantee got no answer, although a later one did."""
+
+    watched: Watched
+    came: dict[object, set[str]] = field(default_factory=dict)
+    """For each key, the inputs that have come, while others have not."""
+    waiting: dict[object, None] = field(default_factory=dict)
+    """The keys of inputs that are later than all answered ones."""
+    passed: dict[object, None] = field(default_factory=dict)
+    """The keys of earlier ones without an answer."""
+    answered: dict[object, None] = field(default_factory=dict)
+
+    def heard(self, name: str, key: object) -> None:
+        if key is None or name not in self.watched.paired:
+            return
+        came = self.came.setdefault(key, set())
+        came.add(name)
+        if len(came) == len(self.watched.paired) and key not in self.passed:
+            del self.came[key]
+            self.waiting[key] = None
+            if key in self.answered:
+                self.answer(key)
+        _bound(self.came, self.waiting)
+
+    def answer(self, key: object) -> None:
+        self.answered[key] = None
+        self.passed.pop(key, None)
+        if key in self.waiting:
+            keys = [*self.waiting]
+            at = keys.index(key)
+            self.passed |= dict.fromkeys(keys[:at])
+            self.waiting = dict.fromkeys(keys[at + 1 :])
+        _bound(self.passed, self.answered)
+        self.watched.tally.unanswered = len(self.passed)
+
+    def pardon(self, key: object) -> None:
+        """An assumption does not hold of this input: it needs no answer."""
+        self.answered[key] = None
+        self.waiting.pop(key, None)
+
+
+def _bound(*kept: dict[object, Any]) -> None:
+    for keys in kept:
+        if len(keys) > UNANSWERED_KEPT:
+            del keys[next(iter(keys))]
+
+
 Choices = list[list[InputMessage]] | str
 """The messages of each input that an answer may have answered, or why there are none."""
 
@@ -151,6 +199,8 @@ class Pairing:
     """The place of an answer's message → the places of the messages that it was paired with."""
     readers: Mapping[str, Reader] = field(default_factory=dict, repr=False)
     """For each variable whose events are kept, its reader."""
+    replies: dict[int, Replies] = field(default_factory=dict)
+    """By key, stamp and call: the replies to a guarantee's inputs, by the id of the watched clause."""
     settled: Ticks | None = None
     """By latency: no input of this time or an earlier one may come any more."""
     late: str = ""
@@ -176,6 +226,14 @@ class Pairing:
         """The number of messages of an input that are later than a time, as far as they are kept."""
         return sum(message.time > ticks(time) for message in self.input(name).messages)
 
+    def heard(self, name: str, key: object) -> None:
+        for replies in self.replies.values():
+            replies.heard(name, key)
+
+    def replied(self, watched: Watched, key: object) -> None:
+        if id(watched) in self.replies:
+            self.replies[id(watched)].answer(key)
+
     def begins(self, values: Mapping[str, Value]) -> None:
         """The values before any message: at no time and no place, so that they have no age."""
         for name, value in values.items():
@@ -189,6 +247,7 @@ class Pairing:
         if self.answers.by != "latency":
             message = InputMessage(time, seconds, key, value, place)
             self._touched.append(message.key)
+            self.heard(name, key)
             if any(one.used and self._differ(name, one, message) for one in known.by_key.get(message.key, ())):
                 self.late = self.late or f"a message of {name} has the key of one that was answered before"
             known.keep(message)

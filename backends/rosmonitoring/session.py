@@ -266,7 +266,7 @@ class Session:
 
 
 _COUNTED = {
-    **{name: name for name in ("judged", "broken", "excused", "overdue", "undecided", "published", "decided")},
+    **{n: n for n in ("judged", "broken", "excused", "overdue", "undecided", "unanswered", "published", "decided")},
     "undecided_order": "order", "before_first": "early", "unreadable": "unreadable", "incomplete": "partial",
     "nameless": "nameless", "by_initial_value": "supposed", "after_unseen": "forgotten", "open_at_end": "open",
 }  # fmt: skip

@@ -45,6 +45,9 @@ COMBINATIONS = 64
 KEYS_KEPT = 1_000
 """Messages of an input, and answers, that wait for their counterpart: ten seconds at 100 Hz."""
 
+UNANSWERED_KEPT = 100_000
+"""Keys of inputs without an answer, or of answers, that are kept: more than one batch of messages has."""
+
 DECIDED_SHARE = 1.0
 """The share of publications that has to be decided before a run is evidence, unless the plan sets another: an undecided
 one may have broken the guarantee."""

@@ -64,6 +64,7 @@ class Shown:
         self.decided = sum(t.decided for t in tallies)
         self.undecided = sum(t.undecided for t in tallies)
         self.published = sum(t.published for t in tallies)
+        self.unanswered = sum(t.unanswered for t in tallies)
         self.asked = sum(t.asked for t in tallies)
         self.excused = sum(t.excused for t in tallies)
         self.open_ends = sum(t.open for t in tallies)
@@ -104,6 +105,7 @@ class Shown:
         }
         found |= {"oldest": {of: round(age, 6) for of, age in self.ages.items()}} if self.ages else {}
         found |= {"open": self.open_ends} if self.open_ends else {}
+        found |= {"unanswered": self.unanswered} if self.unanswered else {}
         found |= {} if self.uncounted else {"lost": self.lost}
         return found | ({"out_of_order": self.disordered} if self.disordered else {})
 
@@ -211,7 +213,7 @@ def _monitored(s: Shown) -> Answer:
     parts = (
         (s.ages, f"; {old(s.ages)}"),
         (s.lost or s.disordered, f"; {s.lost} messages lost, {s.disordered} out of order"),
-        (s.decided < s.published, f" ({s.lacking})"),
+        (s.decided < s.asked or s.decided < s.published, f" ({s.lacking})"),
         (s.open_ends, f"; what it demands was open at the end of {s.open_ends} of {len(s.runs)} traces"),
         (s.vacuous, "; but its antecedent was never met"),
         (s.vacuous and s.wanted, f" by an answer that was decided: {s.wanted}"),

@@ -54,6 +54,8 @@ class Tally:
     """Steps at which a response that had missed its deadline was still missing: no further breaches."""
     open: int = 0
     """Runs at whose end a response was still required, or may have been."""
+    unanswered: int = 0
+    """Inputs without an answer, although later ones had one."""
     published: int = 0
     """Answers: publications of its outputs, where those that make one answer count once."""
     triggered: bool = False
@@ -73,8 +75,8 @@ class Tally:
 
     @property
     def asked(self) -> int:
-        """The number of answers that had to be decided."""
-        return self.published - self.supposed - self.overdue
+        """The number of answers that had to be decided, and of inputs without one."""
+        return self.published + self.unanswered - self.supposed - self.overdue
 
     def withdrawn(self, reason: str) -> None:
         """All judgements so far are undecided after all, except breaches, which were reported."""
@@ -125,6 +127,7 @@ def coverage(tally: Tally) -> str:
         (tally.nameless, "of an unknown publisher {}"),
         (tally.partial, "part of an incomplete answer {}"),
         (tally.forgotten, "undecided, since earlier steps were not seen {}"),
+        (tally.unanswered, "unanswered inputs {}"),
         (tally.supposed, "held by the plan's initial value, before any message {}"),
     ]
     told = ", ".join(words.format(count) for count, words in parts if count)

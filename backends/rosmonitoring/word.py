@@ -178,6 +178,9 @@ def _pass(monitor: Monitor, names: set[str]) -> None:
         watched.tally.published += 1
         watched.tally.unsure(ALONE)
         watched.memory.clear()
+    inputs = all(name.startswith(f"{Role.INPUT}.") for name in names)
+    for watched in monitor.about(monitor.clauses) if inputs else ():
+        watched.tally.unanswered += bool(watched.outputs and watched.inputs) and names.issuperset(watched.inputs)
     for name in names | {name for name, source in monitor.previous if source in names}:
         if of_latest(monitor.setup.rules[name]):
             monitor.forget(name)

@@ -312,3 +312,48 @@ def test_a_key_that_comes_again_with_another_value_once_it_was_answered_is_no_ev
     running = session(make_system(RCL, MAPPING, answers=KEY))
     assert list(running.run(trace)) == []
     assert bool([*running.unmonitored()]) is not evidence
+
+
+REMEMBERS = RCL.replace("guarantee low", "guarantee same ( once(in.r < 10) or out.s == high )\n  guarantee low")
+
+
+@pytest.mark.parametrize("text", [RCL, REMEMBERS], ids=["pairs", "steps"])
+@pytest.mark.parametrize(
+    ("inputs", "answered", "missing"),
+    [
+        ([1, 12, 12, 12, 1], [0, 3], 2),  # the last may have its answer later
+        ([1, 12, 12], [0, 1, 2], 0),
+        ([1, 12, 12], [2, 1], 1),  # an answer that comes late is one
+        ([1, 12], [], 0),
+        ([1, 12, 1, 1], [0, 3, 3], 2),
+    ],
+)
+def test_inputs_without_an_answer_are_undecided(
+    inputs: list[int], answered: list[int], missing: int, text: str, make_system: Callable[..., System], tmp_path: Path
+) -> None:
+    events: list[Event] = [{"topic": "r", "time": k, "value": r, "id": k} for k, r in enumerate(inputs)]
+    events += [
+        {"topic": "s", "time": 10 + k, "level": "low" if inputs[of] < 10 else "high", "id": of}
+        for k, of in enumerate(answered)
+    ]
+    system = make_system(text, MAPPING, answers=KEY, traces=["t.jsonl"])
+    if text is RCL:
+        violations, tallies = judge(system, events)
+        assert violations == []
+        assert {name: tallies[name].unanswered for name in ("low", "high")} == dict.fromkeys(("low", "high"), missing)
+    elif answered == sorted(set(answered)):
+        assert judge(system, events)[1]["same"].unanswered == missing
+    if text is RCL and answered:
+        (system.plan.root / "t.jsonl").write_text("".join(json.dumps(event) + "\n" for event in events))
+        found = BACKEND.discharge(job_for(system, "n"), tmp_path / "made", Limits()).outcomes[0]
+        assert found.verdict is (Verdict.UNKNOWN if missing else Verdict.MONITORED)
+        assert found.bound.get("unanswered") == (missing or None)
+        assert ("unanswered inputs" in found.summary) is bool(missing)
+
+
+def test_an_input_that_breaks_an_assumption_needs_no_answer(make_system: Callable[..., System]) -> None:
+    events: list[Event] = [{"topic": "r", "time": k, "value": r, "id": k} for k, r in enumerate((1, -1, 1))]
+    events.append({"topic": "s", "time": 9, "level": "low", "id": 2})
+    violations, tallies = judge(make_system(RCL, MAPPING, answers=KEY), events)
+    assert [v.fault for v in violations] == [Fault.ASSUMPTION]
+    assert tallies["low"].unanswered == 1

@@ -139,7 +139,7 @@ class Board:
                 yield Status(name, ERROR, latest.text(), counts)
             elif not tally.judged:
                 yield Status(name, STALE, tally.reason or "not judged yet", counts)
-            elif tally.undecided or tally.order or tally.forgotten:
+            elif tally.undecided or tally.order or tally.forgotten or tally.unanswered:
                 yield Status(name, WARN, coverage(tally), counts)
             else:
                 yield Status(name, OK, coverage(tally), counts)
