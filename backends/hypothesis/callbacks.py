@@ -28,8 +28,10 @@ from avow.evidence.record import CASE, RETRY
 from avow.formulas.temporal.cells import longest_limits
 from avow.formulas.values import show
 from avow.isolation.observed import Observed
+from avow.language.terms import Role
 from avow.ros.sources import message_files
 from avow.system.plan import Driving
+from avow.system.topics import whole_name
 
 from . import tuning
 from .convention import ANY, EXACT, SPECIAL
@@ -120,6 +122,8 @@ class _Work:
     messages: int = 0
     runs: int = 0
     rejected: int = 0
+    answers: dict[str, list[int]] = field(default_factory=dict)
+    """Topic → how many of its drawn messages got an answer at once, and how many none at all."""
     replayed: int = 0
     counts: dict[str, _Count] = field(default_factory=dict)
     failing: dict[str, Messages] = field(default_factory=dict)
@@ -185,6 +189,7 @@ class _Work:
                 self.first.append((events, run))
             self.runs += drawn
             self.messages += drawn * len(events)
+            self.count_answers(events if drawn else (), run)
             self.replayed += not drawn
             judged = self.judged(events, run)
             for name, count in self.counts.items():
@@ -196,6 +201,27 @@ class _Work:
                 count.reason = count.reason or one.reason
                 if self.wrong(name, run, judged) is not None:
                     self.failing.setdefault(name, events)
+
+    def count_answers(self, events: Messages, run: Run) -> None:
+        """Which messages a callback answered; a publication of a later timer answers all messages before it."""
+        said = [event for event in run.said if event.topic in self.outputs]
+        timed = max((e.after for e in said if not e.after or e.at > events[e.after - 1].at), default=0) if events else 0
+        at_once = {event.after for event in said}
+        for number, event in enumerate(events, 1):
+            counts = self.answers.setdefault(event.topic, [0, 0])
+            counts[0] += number in at_once
+            counts[1] += number not in at_once and number > timed
+
+    @property
+    def unanswered(self) -> int:
+        """The drawn messages without an answer, on topics whose messages it answers at once."""
+        return sum(none for at_once, none in self.answers.values() if at_once)
+
+    @property
+    def outputs(self) -> frozenset[str]:
+        node, names = self.job.node, self.job.system.plan.ros.names
+        topics = (t for t in node.topics if t.port is not None and t.port.role is Role.OUTPUT)
+        return frozenset(whole_name(names, node, topic) for topic in topics)
 
     def judged(self, events: Messages, run: Run) -> JudgedRun:
         return self.judge(self.recorded(events, run.beside(events)))
@@ -296,6 +322,7 @@ class _Work:
         found: dict[str, object] = {"cases": self.messages, "runs": self.runs, "rejected": self.rejected}
         found |= {"replayed": self.replayed} if self.replayed else {}
         found |= {"begins": self.driver.topics.state} if self.driver.topics.state else {}
+        found |= {"unanswered": self.unanswered} if self.unanswered else {}
         return found | {"seed": self.limits.seed}
 
     def settled(self, obligation: Obligation, stopped: str, unsteady: str, wrong: Sequence[Counterexample]) -> Outcome:
@@ -320,6 +347,7 @@ class _Work:
         bound["failure_probability_below"] = failure_bound(self.runs)
         bound["failure_probability_when_triggered_below"] = failure_bound(count.triggered)
         before = f", {self.replayed} that refuted it or a neighbour before" if self.replayed else ""
+        before += f", {self.unanswered} messages without an answer" if self.unanswered else ""
         summary = (
             f"{self.runs} drawn runs of {self.messages} messages{before}: held at {count.held} judgements, none breaks "
             f"it (seed {self.limits.seed}; 95 %: below {shown_bound(count.triggered)} of such runs fail)"

@@ -57,6 +57,18 @@ def test_right_classes_are_tested_of_their_source(tmp_path: Path, kind: str, tex
     assert found["high"].bound["runs"] == 15
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize(("text", "some_missing"), [(DIRECT, True), (DIRECT, False), (ROS1, False)])
+def test_messages_without_an_answer_are_counted(tmp_path: Path, text: str, some_missing: bool) -> None:
+    """Unless a later timer answers them."""
+    drop = "self.said.publish(self.level)"
+    text = text.replace(drop, f"message.data > 300 or {drop}") if some_missing else text
+    found = asked(job(tmp_path / "w", "rospy", text, "{cases: 300}"))["low"]
+    assert found.verdict is Verdict.TESTED
+    assert ("unanswered" in found.bound) is some_missing
+    assert ("messages without an answer" in found.summary) is some_missing
+
+
 MUTANTS = {
     "strict": (">= self.red", "> self.red"),
     "one double off": (">= self.red", ">= self.red + 3e-14"),
