@@ -63,11 +63,11 @@ class Level(StrEnum):
 
 
 MEANINGS = {
-    Level.SHOWN: "everything below is proved, or checked exhaustively, of what runs",
-    Level.MODELS: "something below is proved or checked of a model only: what runs may differ",
+    Level.SHOWN: "everything below is proved, or checked exhaustively, of the running program",
+    Level.MODELS: "something below is proved or checked of a model only; the program may differ",
     Level.TESTS: "something below is sampled: tests, recordings or measurements",
     Level.ARGUED: "a person vouches for the sentence or for a guarantee below",
-    Level.NOT_SHOWN: "missing, stale, not validated, or resting on what is not shown",
+    Level.NOT_SHOWN: "evidence is missing or stale, the requirement is not validated, or a claim below is not shown",
     Level.REFUTED: "there is a counterexample",
     Level.EXAMINED: "known-bad material, or a plan that names no requirement",
 }
