@@ -90,7 +90,8 @@ def wrong(known: Setup, rng: random.Random) -> list[str]:
     run, told = run_of(rng), list[str]()
     events = recorded(run, rng)
     fine = rng.random() < 0.5
-    events = [event for event in events if fine or rng.random() > 0.1]
+    order = known.answers is not None and known.answers.by == "order"  # then a lost first message is never noticed
+    events = [event for event in events if fine or rng.random() > 0.1 or (order and event["id"] == 0)]
     term = formula(rng, rng.randrange(1, 4))
     trigger, wanted = response(rng)
     for asked in (term, Implies(trigger, wanted)):
