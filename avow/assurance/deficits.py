@@ -88,7 +88,7 @@ def deficits(
         "models": [v.id for v in guarantees if v.id in relied and looked_at(relied[v.id]) is Object.MODEL],
         "unowned": [s.key for s in assumptions if not s.owned],
         "sampled": [v.id for v in leaves if _status(v, relied) in (Status.TESTED, Status.MONITORED)],
-        "unanswered": [v.id for v in leaves if any("unanswered" in e.entry.evidence.bound for e in v.counting)],
+        "unanswered": [v.id for v in leaves if any(e.entry.evidence.bound.get("unanswered") for e in v.counting)],
         "read": [v.id for v in guarantees if _status(v, relied) is Status.REVIEWED],
         "single": list(single),
         "tied": [v.id for v in guarantees if v.id in relied and _by_hand(v, relied[v.id])],

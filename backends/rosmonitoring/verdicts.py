@@ -214,6 +214,7 @@ def _monitored(s: Shown) -> Answer:
         (s.ages, f"; {old(s.ages)}"),
         (s.lost or s.disordered, f"; {s.lost} messages lost, {s.disordered} out of order"),
         (s.decided < s.asked or s.decided < s.published, f" ({s.lacking})"),
+        (s.unanswered, f"; {s.unanswered} inputs without an answer"),
         (s.open_ends, f"; what it demands was open at the end of {s.open_ends} of {len(s.runs)} traces"),
         (s.vacuous, "; but its antecedent was never met"),
         (s.vacuous and s.wanted, f" by an answer that was decided: {s.wanted}"),

@@ -75,8 +75,8 @@ class Tally:
 
     @property
     def asked(self) -> int:
-        """The number of answers that had to be decided, and of inputs without one."""
-        return self.published + self.unanswered - self.supposed - self.overdue
+        """The number of answers that had to be decided."""
+        return self.published - self.supposed - self.overdue
 
     def withdrawn(self, reason: str) -> None:
         """All judgements so far are undecided after all, except breaches, which were reported."""
