@@ -64,15 +64,10 @@ def _conflicts(path: Path, found: Carried, known: Definitions, types: Mapping[st
         if there != canonical(kind):
             text = f"{path.name}: the topic {topic} is {there} there, and {canonical(kind)} in the contract"
             yield Diagnostic("MON205", text)
-            continue
-        for name, mine, theirs in _differences(there, known.messages, found.known):
-            text = (
-                f"{path.name}: {name} is {_fields(theirs)} there, and {_fields(mine)} by "
-                f"{mine.source or 'the definition that is known'}"
-            )
-            yield Diagnostic(
-                "MON205", text, hint="the plan's `messages:` or `ros: {distro: …}` names another definition"
-            )
+        for name, mine, theirs in _differences(there, known.messages, found.known) if there == canonical(kind) else ():
+            here = f"{_fields(mine)} by {mine.source or 'the definition that is known'}"
+            hint = "the plan's `messages:` or `ros: {distro: …}` names another definition"
+            yield Diagnostic("MON205", f"{path.name}: {name} is {_fields(theirs)} there, and {here}", hint=hint)
 
 
 def _differences(

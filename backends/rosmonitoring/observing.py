@@ -405,9 +405,7 @@ def show_entry(entry: Any) -> str:
 
 
 def written_out(entry: Any) -> Mapping[str, Any]:
-    if isinstance(entry, str):
-        return {"field": entry}
-    if isinstance(entry, list):
-        return {"fields": entry}
+    if isinstance(entry, str | list):
+        return {"field" if isinstance(entry, str) else "fields": entry}
     found: Mapping[str, Any] = entry or {}
     return found

@@ -220,6 +220,10 @@ class _Work:
             if known and name.startswith(f"{Role.INPUT}."):
                 text = f"by {by} it has no effect: an answer is judged with the message that it answered"
                 self.fault(text, name, "initial", hint="leave it out, or pair by `latency` or `arrival`")
+        ends = ((p, observing.sources(self.system, self.node, p.name)) for p in self.node.inputs)
+        looped = (
+            p for p, found in ends if any(self.node.name in dataflow(self.system).upstream(s.node) for s in found)
+        )
         usual = {"stamp": ("header", "stamp"), "call": (CALL,), "order": (NUMBER,)}.get(by, ())
         return Answers(
             by,
@@ -228,6 +232,7 @@ class _Work:
             observing.path(str(entry["output"])) if "output" in entry else usual,
             self.duration("answers.latency", entry.get("latency", "0 s")),
             self.duration("answers.jitter", entry.get("jitter", "0 s")),
+            frozenset(port.variable.qualified for port in looped),
         )
 
     def leeway(self, data: Mapping[str, Any]) -> Leeway:
@@ -279,8 +284,7 @@ class _Work:
 
     def wrong(self, text: str, *place: str | int, hint: str | None = None) -> None:
         """Records an error in the options, at its place in the plan."""
-        span = self.options.at(*place) if self.options is not None else None
-        self.faults.append(Diagnostic("MON101", text, span, hint=hint))
+        self.faults.append(Diagnostic("MON101", text, self.options.at(*place) if self.options else None, hint=hint))
 
     def port(self, port: Port) -> None:
         name = port.variable.qualified
@@ -423,22 +427,18 @@ class _Work:
             raise observing.Wrong(f"there is no output {source!r}", "previous", hint=suggest(name, known))
         if known[name].sort != port.sort:
             raise observing.Wrong(f"{source} is of another type", "previous")
-        edge = self.edge(port)
-        initial = (
-            observing.literal(entry["initial"], port.sort, "initial") if entry.get("initial") is not None else None
-        )
-        if initial is None and edge is not None and edge.delayed:
+        told = entry.get("initial")
+        initial = None if told is None else observing.literal(told, port.sort, "initial")
+        if initial is None and (edge := self.edge(port)) and edge.delayed:
             initial = self.first(port, edge)
         return Previous(port.variable, f"out.{name}", initial)
 
     def edge(self, port: Port) -> Edge | None:
-        if port.role is not Role.INPUT:
-            return None
         try:
-            graph = dataflow(self.system)
+            feeding = dataflow(self.system).feeding(self.node.name) if port.role is Role.INPUT else ()
         except Rejected:
             return None
-        return next((e for e in graph.feeding(self.node.name) if e.target.port == port.name), None)
+        return next((e for e in feeding if e.target.port == port.name), None)
 
     def first(self, port: Port, edge: Edge) -> Value | None:
         """A delayed edge's first value, if the plan sets one: a value as text, or the formula of an empty relation."""
@@ -447,15 +447,12 @@ class _Work:
         source = self.system.contract.node(edge.source.node)
         try:
             term = parse_term(edge.initial, source, self.system.contract, edge.span)
-        except Rejected:
-            return None
-        if not isinstance(term.sort, BoolSort) or isinstance(port.sort, BoolSort):
-            try:
+            if not isinstance(term.sort, BoolSort) or isinstance(port.sort, BoolSort):
                 value = evaluate(term, {})
-            except NotEvaluable:
-                return None
-            # any kind of number: 1 is a REAL's first value as well as 1.0
-            return whole(value) if isinstance(port.sort, RealSort) and type(value) is int else value
+                # any kind of number: 1 is a REAL's first value as well as 1.0
+                return whole(value) if isinstance(port.sort, RealSort) and type(value) is int else value
+        except (Rejected, NotEvaluable):
+            return None
         return FunctionValue({}, False) if _says_empty(term, edge.source.port) else None
 
 
@@ -466,10 +463,8 @@ def _says_empty(term: Term, port: str) -> bool:
     """``forall(x, y in REAL | not out.at(x, y))``."""
     match term:
         case Quantified(
-            quantifier=Quantifier.FORALL,
-            variables=variables,
-            body=Not(body=Apply(function=Variable(role=Role.OUTPUT, name=name), arguments=arguments)),
+            quantifier=Quantifier.FORALL, variables=bound, body=Not(body=Apply(function=f, arguments=args))
         ):
-            return name == port and arguments == variables
+            return isinstance(f, Variable) and (f.role, f.name) == (Role.OUTPUT, port) and args == bound
         case _:  # of another form
             return False

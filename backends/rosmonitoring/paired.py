@@ -161,9 +161,11 @@ class Paired:
             if watch.column(name) is not None:
                 certain &= watch.codes(name, rows) >= 0
         ranges = {name: self._match(self._inputs[name], ids) for name in names}
-        for first, _ in ranges.values():
-            certain &= first >= 0
         latency = self._by == "latency"
+        for name, (first, _) in ranges.items():
+            certain &= first >= 0
+            if not latency and name in self._pairing.answers.looped:  # the engine judges an input after its answer
+                certain[certain] &= self._inputs[name].seconds[first[certain]] <= self._batch.times[rows[certain]]
         ends = ids + self._jitter if latency else rows
         if latency:
             certain &= ends < self._times[self._listened[-1]]

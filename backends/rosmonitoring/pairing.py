@@ -35,6 +35,7 @@ if TYPE_CHECKING:
 
 NUMBER = "_number"
 """By order: the field with a message's number among those of its topic."""
+AFTER = "in a loop, an input with the answer's key came after the answer: pair them in another way (`answers`)"
 LOST = "a message was lost: the order of the others does not show which belong together"
 
 
@@ -48,6 +49,8 @@ class Answers:
     output: FieldPath = ()
     latency: Fraction = Fraction(0)
     jitter: Fraction = Fraction(0)
+    looped: frozenset[str] = frozenset()
+    """The inputs that earlier answers of the node reach: a message after an answer may be made from it."""
 
 
 Ticks = int | Fraction
@@ -384,6 +387,8 @@ class Pairing:
         alike = known.by_key.get(asked.key)
         if not alike:
             return f"no message of {name} has the answer's {self.answers.by}: pair them in another way (`answers`)"
+        if name in self.answers.looped and any(one.time > asked.time for one in alike):
+            return AFTER
         if len(alike) == 1:
             alike[0].used = True
             asked.since[name] = alike[0].seconds

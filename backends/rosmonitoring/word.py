@@ -129,6 +129,10 @@ class Word:
         self._forget(key)
         inputs = tuple(message for message in taken if not self.topics[message.topic])
         outputs = tuple(message for message in taken if self.topics[message.topic])
+        looped = [i for i in inputs if any(name in self.answers.looped for name, _ in i.readers)]
+        if any(time_of(i.event) > time_of(o.event) for i in looped for o in outputs):
+            yield from self._unpaired(taken)
+            return
         given = {name: (message.place,) for message in inputs for name, _ in message.readers}
         for message in outputs:
             self.answered[message.place] = given

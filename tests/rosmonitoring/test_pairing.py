@@ -157,6 +157,34 @@ def test_by_stamp(make_system: Callable[..., System]) -> None:
     assert "has the answer's stamp" in tallies["high"].reason
 
 
+LOOPED = f"""{RCL}
+node m {{
+  inputs( s : Level )
+  outputs( r : REAL )
+  topics( m/S s matches(in.s), m/R r matches(out.r) )
+  guarantee any ( TRUE )
+}}
+"""
+
+
+@pytest.mark.parametrize("clause", ["", "guarantee ever ( once(in.r < 10) -> TRUE )"])
+@pytest.mark.parametrize("connection", [["m.r", "n.r", "0"], ["n.s", "m.s", "low"], None])
+def test_in_a_loop_an_answer_is_not_paired_with_what_was_made_from_it(
+    clause: str, connection: list[str] | None, make_system: Callable[..., System]
+) -> None:
+    rcl = LOOPED.replace("  guarantee high", f"  {clause}\n  guarantee high")
+    keys = ("from", "to", "initial")
+    told = [{**dict(zip(keys, connection, strict=True)), "delayed": True}] if connection else []
+    for topics, judged in (("sr", 0), ("rs", 20)):
+        events = [
+            {"topic": topic, "time": k + at / 100, "id": k, "value": 12, "level": "low"}
+            for k in range(20)
+            for at, topic in enumerate(topics)
+        ]
+        violations, tallies = judge(make_system(rcl, MAPPING, answers=KEY, plan={"connections": told}), events)
+        assert (tallies["high"].decided, len(violations)) == (judged, judged)
+
+
 @given(st.lists(st.tuples(st.sampled_from("rsx"), st.sampled_from((1, 12, "?")), st.integers(0, 40)), max_size=40))
 def test_every_publication_is_counted_once(steps: list[tuple[str, Any, int]]) -> None:
     events: list[Event] = []
