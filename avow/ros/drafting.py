@@ -312,8 +312,10 @@ class _Draft:
             if dropped:
                 lines += ["  dropped:", *(f"    {json.dumps(name)}: {why}" for name, why in dropped.items())]
         lines += ["", *self.environment(nodes), *self.loops(nodes), "nodes:"]
+        stamps = [arc for arc, topics in self.carried(nodes).items() if any(map(self.stamped, topics))]
+        looped = {name for part in components(nodes, stamps) if len(part) > 1 for name in part}
         for name, node in nodes.items():
-            lines += self.methods(name, node)
+            lines += self.methods(name, node, name in looped)
         return "\n".join([*lines, ""])
 
     def environment(self, nodes: Mapping[str, Listed]) -> list[str]:
@@ -330,12 +332,11 @@ class _Draft:
 
     def loops(self, nodes: Mapping[str, Listed]) -> list[str]:
         """For each loop the connection to delay: a person says what was there before the first step."""
-        heard = {t: [n for n, x in nodes.items() if t in x.subscribes] for t, ports in self.ports.items() if ports}
-        carried: dict[tuple[str, str], list[str]] = {}
-        for name, node in nodes.items():
-            for topic, other in ((t, b) for t in node.publishes for b in heard.get(t, ()) if b != name):
-                carried.setdefault((name, other), []).append(topic)
-        backs = [(cycle[-1], cycle[0]) for part in components(nodes, carried) for cycle in cycles_in(part, carried)]
+        carried = self.carried(nodes)
+        backs: dict[tuple[str, str], None] = {}
+        parts = components(nodes, carried)
+        while cycles := [c for part in parts for c in cycles_in(part, (arc for arc in carried if arc not in backs))]:
+            backs |= {(cycle[-1], cycle[0]): None for cycle in cycles}
         said = ((a, p.name, b, topic) for a, b in backs for topic in carried[a, b] for p in self.ports[topic])
         lines = [
             f"#   - {{from: {a}.{p}, to: {b}.{p}, delayed: true, initial: …}}  # {topic}" for a, p, b, topic in said
@@ -343,7 +344,16 @@ class _Draft:
         head = "# connections:                         # in a loop: say what was there before the first step"
         return [head, *lines, ""] if lines else []
 
-    def methods(self, name: str, node: Listed) -> list[str]:
+    def carried(self, nodes: Mapping[str, Listed]) -> dict[tuple[str, str], list[str]]:
+        """The topics from each node to each other."""
+        heard = {t: [n for n, x in nodes.items() if t in x.subscribes] for t, ports in self.ports.items() if ports}
+        found: dict[tuple[str, str], list[str]] = {}
+        for name, node in nodes.items():
+            for topic, other in ((t, b) for t in node.publishes for b in heard.get(t, ()) if b != name):
+                found.setdefault((name, other), []).append(topic)
+        return found
+
+    def methods(self, name: str, node: Listed, looped: bool) -> list[str]:
         sides = (("in", node.subscribes), ("out", node.publishes))
         entries: dict[str, str] = {}
         for role, topics in sides:
@@ -360,7 +370,7 @@ class _Draft:
         if any(key.startswith("in.") for key in entries) and any(key.startswith("out.") for key in entries):
             lines += [
                 "          # Which input did an answer answer? Until this is said, what is judged is no evidence:",
-                f"          # answers: {self.answers(node)}",
+                f"          # answers: {self.answers(node, looped)}",
             ]
         return lines
 
@@ -372,14 +382,20 @@ class _Draft:
         told = (f"{{path: {json.dumps(path)}, sha256: {digest}}}" for path, digest in self.given.traces.items())
         return f"&recordings [{', '.join(told)}]"
 
-    def answers(self, node: Listed) -> str:
-        """By stamp if all that it receives and publishes is stamped."""
+    def stamped(self, topic: str) -> bool:
+        kind = self.given.known.get(self.given.listing.types.get(topic, ""))
+        return kind is not None and kind.field("header") is not None
+
+    def answers(self, node: Listed, looped: bool) -> str:
+        """By stamp if all that it receives and publishes is stamped, and no stamp comes back to it in a loop."""
         topics = [t for t in (*node.subscribes, *node.publishes) if self.ports.get(t)]
         if all(map(is_part, topics)):
             return "{by: call}"
-        kinds = [self.given.known.get(self.given.listing.types.get(t, "")) for t in topics]
-        stamped = all(kind is not None and kind.field("header") is not None for kind in kinds)
-        return "{by: stamp}" if stamped else "{latency: 10 ms, jitter: 2 ms, because: …}"
+        return (
+            "{by: stamp}"
+            if all(map(self.stamped, topics)) and not looped
+            else "{latency: 10 ms, jitter: 2 ms, because: …}"
+        )
 
 
 def _constants(wire: Wire, name: str, holder: Message) -> dict[str, str]:

@@ -242,6 +242,24 @@ def test_a_loop_is_drafted_with_the_connection_to_delay(length: int, tmp_path: P
     assert dataflow(load_system(folder)).findings == ()
 
 
+def test_loops_that_share_nodes_and_stamps_are_drafted(tmp_path: Path) -> None:
+    """Every loop has a connection to delay, and no stamp that comes back tells which input was answered."""
+    arcs = ["ab", "ba", "bc", "cd", "dc", "da", "df"]
+    graph: dict[str, dict[str, dict[str, str]]] = {f"/{n}": {"publishers": {}, "subscribers": {}} for n in "abcdfx"}
+    for source, target in [*arcs, "fx"]:
+        graph[f"/{source}"]["publishers"][f"/{source}{target}"] = "sensor_msgs/Temperature"
+        graph[f"/{target}"]["subscribers"][f"/{source}{target}"] = "sensor_msgs/Temperature"
+    (tmp_path / "g.json").write_text(json.dumps(graph), encoding="utf-8")
+    options = [str(tmp_path / "w"), "--from-graph", str(tmp_path / "g.json"), "--distro", "noetic"]
+    assert CliRunner().invoke(init, options, catch_exceptions=False).exit_code == 0
+    folder = tmp_path / "w/contracts/w"
+    plan = (folder / "plan.yaml").read_text(encoding="utf-8")
+    assert plan.count("{by: stamp}") == 1  # f's alone
+    text = re.sub("^# (connections:|  - )", r"\1", plan.replace("initial: …", "initial: 0"), flags=re.MULTILINE)
+    (folder / "plan.yaml").write_text(text, encoding="utf-8")
+    assert dataflow(load_system(folder)).findings == ()
+
+
 CALLS = """\
 /gripper
   Service Servers:
