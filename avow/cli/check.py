@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import click
 
 from avow.base.codec import document
+from avow.base.codes import CODES
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.plain import count
 from avow.base.rendering import render, summary, to_sarif, told
@@ -130,7 +131,8 @@ def _system(folder: Path, found: list[Diagnostic]) -> tuple[list[Path], frozense
             plan, _, faults, _ = read_rest(plan_file)
         except Rejected as rejected:
             found.extend(rejected.diagnostics)
-            return sorted(folder.glob("*.rcl")), frozenset()
+            lints = frozenset(code for code, one in CODES.items() if one.is_lint)  # which of them are off is unknown
+            return sorted(folder.glob("*.rcl")), lints
         found.extend(faults)
         given = Path.cwd() / folder
         names = [folder / f.relative_to(given) if f.is_relative_to(given) else f for f in plan.contract_files]

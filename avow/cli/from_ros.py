@@ -55,6 +55,8 @@ def draft_system(bag: Path | None, graph: str | None, distro: str | None, folder
         except NoBag as no:
             raise Rejected(Diagnostic("CLI011", str(no), hint=no.hint and no.hint.replace(*_OPTION))) from None
         differences = tuple(_differences(listing, found)) if listing is not None else ()
+        if seen and not any(one.count for one in seen.values()):
+            differences += (f"{bag.name} has no message of these topics: the draft has no recorded values",)
         listing, unsaid = _together(listing, found, heard)
         given = replace(
             given,

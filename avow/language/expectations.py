@@ -149,6 +149,8 @@ def _in_formula(
         return f"a formula is missing before `{found.text}`"
     if found.type == "$END" and {"THEN", "ELSE"} & expected:
         return _IN_FORMULA["THEN"]
+    if found.type == "COMMA" and before is not None and after is not None and before.type == after.type == "NUMBER":
+        return f"write a decimal point: `{before.text}.{after.text}`"
     if found.type in _IN_FORMULA:
         return _IN_FORMULA[found.type]
     if found.type in ("NAME", "NUMBER", "STRING", "IN", "OUT", "LPAR", "NOT", *_QUANTIFIERS):

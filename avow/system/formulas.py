@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.base.records import dataclass
+from avow.base.suggestions import did_you_mean
 from avow.language.definedness import with_value
 from avow.language.sorts import BOOL
 from avow.language.subterms import histories, ports_of
@@ -52,7 +53,8 @@ def initial_condition(system: System, edge: Edge) -> Term | None:
         failures.append(Rejected(_speaks_of(edge, foreign[0])))
     what = "; ".join(d.message for d in failures[0].diagnostics)
     message = f"{text!r} is no value of {edge.source} ({port.type_name}), nor a formula about out.{port.name}: {what}"
-    raise Rejected(Diagnostic("PLAN112", message, edge.initial_span))
+    hint = "write `true` or `false`" if port.sort == BOOL else did_you_mean(text, getattr(port.sort, "members", ()))
+    raise Rejected(Diagnostic("PLAN112", message, edge.initial_span, hint=hint))
 
 
 def _speaks_of(edge: Edge, variable: Variable) -> Diagnostic:

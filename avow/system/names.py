@@ -91,14 +91,13 @@ def _requirements(plan: Plan, root: Piece, nodes: dict[str, Node]) -> Iterator[D
     goals = [*(goal.name for goal in plan.compose), *(subsystem.name for subsystem in plan.subsystems)]
     for name, _, requirement in root.keyed("requirements"):
         for item in requirement.each("supported_by"):
-            owner, dot, clause = item.text.partition(".")
+            owner, dot, _ = item.text.partition(".")
             if item.text in goals or (not dot and owner in nodes):
                 continue
             where = f"requirements.{name}.supported_by"
-            if owner not in nodes:
-                yield _unknown(where, item.text, [*nodes, *goals], item.span)
-            elif clause not in [g.name for g in nodes[owner].guarantees]:
-                yield _unknown(where, item.text, [f"{owner}.{g.name}" for g in nodes[owner].guarantees], item.span)
+            known = [f"{n}.{g.name}" for n in nodes for g in nodes[n].guarantees if n == owner or owner not in nodes]
+            if item.text not in known:
+                yield _unknown(where, item.text, known if owner in nodes else [*nodes, *goals, *known], item.span)
 
 
 def _assumptions(plan: Plan, root: Piece) -> Iterator[Diagnostic]:

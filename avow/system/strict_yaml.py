@@ -141,7 +141,7 @@ _PROBLEMS = (
     (
         r"expected <block end>, but found '(.*)'",
         "this line is indented as none above it",
-        "a mapping's keys stand in one column",
+        "the keys of a mapping, and the items of a list, stand in one column: compare with the line above",
     ),
     (r"expected ',' or '(.)'", "a `,` or the closing `{0}` is missing", None),
     (r"unexpected end of stream|found document separator", "a quotation mark or a bracket is not closed", None),

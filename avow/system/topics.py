@@ -8,13 +8,13 @@ listener's assumptions then have to follow from each publisher's contract.
 
 from __future__ import annotations
 
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from avow.base.diagnostics import Diagnostic, Severity, Span
 from avow.base.records import dataclass
-from avow.base.suggestions import nearest
+from avow.base.suggestions import did_you_mean, nearest
 from avow.language.contract import Clause, ClauseKind, Contract, Node, Port, Topic
 from avow.language.sorts import BOOL, FunctionSort
 from avow.language.terms import Apply, Compare, Iff, Or, Quantified, Quantifier, Role, Term, Variable
@@ -79,16 +79,21 @@ def ends(nodes: Sequence[Node], names: Resolver) -> Ends:
 
 
 def wrong_types(found: Ends) -> Iterator[Diagnostic]:
-    """Topics whose ends have different message types: ROS does not connect them."""
+    """Topics whose ends have different message types: ROS does not connect them. The most frequent type is taken as
+    meant."""
     first: dict[str, tuple[Endpoint, Carrier]] = {}
-    every = (*found.outputs.items(), *found.inputs.items())
-    for at, carrier in ((at, carrier) for at, carriers in every for carrier in carriers):
+    every = [(at, one) for at, some in (*found.outputs.items(), *found.inputs.items()) for one in some]
+    often = Counter((carrier.topic, carrier.kind) for _, carrier in every)
+    for at, carrier in sorted(every, key=lambda each: -often[each[1].topic, each[1].kind]):
         known = first.setdefault(carrier.topic, (at, carrier))
         if known[1].kind != carrier.kind:
             message = f"{carrier.topic} is {carrier.kind} at {at}, and {known[1].kind} at {known[0]}"
-            notes = ((f"{known[0]} is here", known[1].span),)
-            hint = "a topic has one type: correct one of them, or remap one end under `ros: {nodes: …}`"
-            yield Diagnostic("ROS111", message, carrier.span, hint=hint, notes=notes)
+            hint = (
+                did_you_mean(carrier.kind, [known[1].kind]) or "correct one, or remap one end under `ros: {nodes: …}`"
+            )
+            yield Diagnostic(
+                "ROS111", message, carrier.span, hint=hint, notes=((f"{known[0]} is here", known[1].span),)
+            )
 
 
 def unknown_types(plan: Plan, contract: Contract) -> Iterator[Diagnostic]:
@@ -149,17 +154,12 @@ def contradicted(connections: Sequence[Edge], found: Ends, relays: Collection[st
         apart = not {c.topic for c in ones} & {c.topic for c in others}
         if ones and others and apart:
             one, other = ones[0], others[0]
-            message = (
-                f"{source} is published on {one.topic}, and {target} listens to {other.topic}: "
-                "the connection contradicts the topics"
-            )
+            message = f"the connection contradicts the topics: {source} is on {one.topic}, {target} on {other.topic}"
             yield Diagnostic("ROS112", message, connection.span, hint=_remap_hint(target.node, other, one))
         elif others and apart and (publishers := found.reaching(target)):
             topic = next(c for c in others if found.published.get(c.topic)).topic
-            message = (
-                f"{source} has no topic, and {target} listens to {topic}, which {publishers[0][0]} publishes: the "
-                "connection would silence it"
-            )
+            who = publishers[0][0]
+            message = f"{source} has no topic: the connection would silence {who}, to which {target} listens on {topic}"
             hint = f"give {source} its topic in the contract, or remap {topic} for {target.node} under `ros`"
             yield Diagnostic("ROS112", message, connection.span, hint=hint)
 
@@ -178,7 +178,8 @@ def unheard(source: Endpoint, target: Endpoint, found: Ends, span: Span | None) 
 def _remap_hint(node: str, carrier: Carrier, meant: Carrier) -> str:
     """The entry that the plan may have so that a node listens to the intended topic."""
     remap = f"ros: {{nodes: {{{node}: {{remap: {{{carrier.topic}: {meant.topic}}}}}}}}}"
-    return f"if they are one topic when the robot runs:  {remap}"
+    near = did_you_mean(carrier.topic, [meant.topic])
+    return f"{f'{near} ' if near else ''}if they are one topic when the robot runs:  {remap}"
 
 
 def unlinked(target: Endpoint, carrier: Carrier, source: Endpoint, other: Carrier, span: Span | None) -> Diagnostic:

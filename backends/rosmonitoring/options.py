@@ -312,8 +312,9 @@ class _Work:
             other.port(node.output(source.port))
             rule_there = other.rules.get(f"out.{source.port}")
             if rule_there is not None and otherwise(rule, rule_there):
-                text = f"{source}, to which it is linked, is read otherwise, as {observing.show_entry(entry)}"
-                hint = "leave it out: an input is read as what it is linked to; or give the two ports different names"
+                of = f"{observing.show_entry(entry)} of {getattr(rule_there, 'topic', 'no topic')}"
+                text = f"{source}, to which it is linked, is read otherwise, as {of}"
+                hint = "correct either; an input without a mapping is read as the output; or give them different names"
                 self.fault(text, name, hint=hint)
 
     def shared_fields(self) -> None:

@@ -107,7 +107,7 @@ class Tally:
         """A message of a topic that other nodes publish too has come, without a record of its publisher."""
         self.published += 1
         self.nameless += 1
-        self.reason = self.reason or f"several nodes publish {topic}, and a message does not name its publisher"
+        self.reason = self.reason or f"several nodes publish {topic}, and a message has no `_publisher` (its node)"
 
     reason: str = ""
     """Why it is not judged at all, or the first reason why a judgement was undecided."""

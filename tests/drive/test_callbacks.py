@@ -472,7 +472,7 @@ def test_what_is_published_at_a_message_s_time_stands_where_it_came_about(tmp_pa
 
 def test_a_step_class_has_no_topics(tmp_path: Path) -> None:
     folder = system(tmp_path / "w", "step", "class Watch:\n    def step(self, r):\n        return 'red'\n")
-    assert "has no topics" in told(drive(folder, "watch"))
+    assert all(words in told(drive(folder, "watch")) for words in ("has no topics", "add `kind: rclpy`"))
 
 
 @pytest.mark.slow

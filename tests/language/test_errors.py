@@ -92,6 +92,7 @@ def test_codes_without_example_are_few() -> None:
         ("stat not in {red}", r"RCL120 .*\[write `!in`\]"),
         ("r <> 3", r"RCL120 .*\[unequal is written `!=`\]"),
         ("stat == red;", "RCL120"),
+        ("r < 0,5", r"RCL120 .*\[write a decimal point: `0\.5`\]"),
         ("true", r"RCL201 .*\[write `TRUE`\]"),
         ("forall(a, b | a in REAL and b in REAL and a < b)", r"RCL120 .*\[write `forall\(x, y in REAL"),
         ("stat == red <-> both", r"RCL101 `<->` is not RCL \[write `<=>`\]"),

@@ -181,6 +181,16 @@ def test_a_bag_without_definitions_wants_a_distribution(tmp_path: Path) -> None:
     run(tmp_path / "w", "--from-bag", str(bag), "--distro", "humble")
 
 
+def test_an_empty_bag_is_reported(tmp_path: Path) -> None:
+    import sqlite3
+
+    bag = make_bag(tmp_path / "run", "sqlite3")
+    with sqlite3.connect(next(bag.glob("*.db3"))) as data:
+        data.execute("delete from messages")
+    done = CliRunner().invoke(init, [str(tmp_path / "w"), "--from-bag", str(bag)], catch_exceptions=False)
+    assert "run has no message of these topics" in done.stderr
+
+
 def test_within_a_workspace_only_the_system_is_made(tmp_path: Path) -> None:
     run(tmp_path / "w", "--from-bag", str(make_bag(tmp_path / "run", "ros1")))
     folder = tmp_path / "w/contracts/other"

@@ -46,7 +46,7 @@ def test_an_input_is_read_as_what_all_its_publishers_say(tmp_path: Path, own: An
     ("left", "right", "own", "said"),
     [
         ("x", "y", None, ["it hears left.v, read as x, and right.v, read as y"]),
-        ("x", "x", "y", ["left.v, to which it is linked, is read otherwise, as x", "right.v, to which"]),
+        ("x", "x", "y", ["left.v, to which it is linked, is read otherwise, as x of ", "right.v, to which"]),
         ("more[0]", "more[0]", "more[1]", ["left.v", "right.v"]),
         ({"field": "more", "take": "min"}, "more[0]", {"field": "more", "take": "min"}, ["right.v"]),
         ("x", "x", {"field": "x", "topic": "/elsewhere", "type": "p/Twist"}, ["left.v", "right.v"]),

@@ -155,6 +155,9 @@ def test_a_plan_that_is_no_yaml_keeps_no_fault_of_the_contract_back(tmp_path: Pa
     (folder / "plan.yaml").write_text(PLAN.replace("compose:", "compose:\n\t"))
     for ask in (check, surveyed):
         assert ask(folder) == [("plan.yaml", "PLAN101"), ("system.rcl", "RCL203")]
+    text = "node n { inputs( a : REAL ) outputs( b : REAL ) topics( ) guarantee g ( out.b > 0 ) }"
+    (folder / "system.rcl").write_text(text)  # no lint: the plan may have switched it off
+    assert CliRunner().invoke(command("check"), [str(folder)]).output.endswith("1 file: 1 error\n")
 
 
 @pytest.mark.parametrize(

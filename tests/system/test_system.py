@@ -82,6 +82,7 @@ def test_faults_of_plan_and_contract_come_together(tmp_path: Path) -> None:
         ("environment:\n  in.r: {assume: in.r > q, because: x}", "RCL201", 2, "q", ""),
         ("environment: {in.r: {assume: out.x > 1, because: x}}", "PLAN113", 1, "out.x", "no node provides"),
         ("requirements: {R: {text: t, supported_by: [a.g2]}}", "PLAN106", 1, "a.g2", "a.g1"),
+        ("requirements: {R: {text: t, supported_by: [aa.g1]}}", "PLAN106", 1, "aa.g1", "`a.g1`"),
         ("requirements: {R: {text: t, formula: a.q > 1}}", "RCL203", 1, "q", ""),
         (
             "requirements: {R: {text: t, temporal: always b.y > 1) until (b.y > 2}}",
@@ -117,6 +118,14 @@ def test_names_and_formulas_of_a_plan(tmp_path: Path, plan: str, code: str, line
     assert match[0].span.line == line
     assert Path(match[0].span.file).name == "plan.yaml"
     assert hint in (match[0].hint or "")
+
+
+@pytest.mark.parametrize(("sort", "initial", "hint"), [("BOOL", "0", "`false`"), ("Mode", "idel", "`idle`")])
+def test_an_initial_value_of_another_type(tmp_path: Path, sort: str, initial: str, hint: str) -> None:
+    rcl = "context { Mode : {idle, busy}; }" + node("a", "", f"x : {sort}") + node("b", f"x : {sort}", "y : REAL")
+    plan = f"connections: [{{from: a.x, to: b.x, delayed: true, initial: {initial}}}]"
+    (found,) = [d for d in faults(tmp_path, rcl, plan) if d.code == "PLAN112"]
+    assert hint in (found.hint or "")
 
 
 def test_every_code_is_declared_and_triggered() -> None:

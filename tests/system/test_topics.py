@@ -117,6 +117,16 @@ def test_what_does_not_fit_is_told(tmp_path: Path, text: str, plan: str, codes: 
     assert told(tmp_path, text, plan) == codes
 
 
+def test_a_slip_in_one_type_of_three(tmp_path: Path) -> None:
+    text = SOURCE.replace("std_msgs/Float64", "p/Vacum") + "".join(
+        node(name, "y : REAL", "", "p/Vacuum t matches(in.y)") for name in "bc"
+    )
+    with pytest.raises(Rejected) as caught:
+        dataflow(make(tmp_path, text))
+    (found,) = caught.value.diagnostics
+    assert (found.code, found.hint, found.span and found.span.line) == ("ROS111", "did you mean `p/Vacuum`?", 5)
+
+
 def test_a_slip_in_one_of_two_topics_is_no_crossed_connection(tmp_path: Path) -> None:
     text = node("a", "", "x : REAL, z : REAL", "p/P thurst matches(out.x), p/P thrust matches(out.z)")
     text += node("b", "x : REAL, z : REAL", "", "p/P thrust matches(in.x), p/P thrust matches(in.z)")
@@ -124,6 +134,10 @@ def test_a_slip_in_one_of_two_topics_is_no_crossed_connection(tmp_path: Path) ->
         dataflow(make(tmp_path, text))
     (found,) = caught.value.diagnostics
     assert (found.code, found.hint) == ("ROS115", "a.x is published on `/thurst`: did you mean `/thrust`?")
+    text = node("a", "", "x : REAL", "p/P flow matches(out.x)") + node("b", "y : REAL", "", "p/P flwo matches(in.y)")
+    with pytest.raises(Rejected) as caught:
+        dataflow(make(tmp_path, text, "connections: [{from: a.x, to: b.y}]"))
+    assert (caught.value.diagnostics[0].hint or "").startswith("did you mean `/flow`?")
 
 
 def test_an_end_without_a_topic_links_by_name(tmp_path: Path) -> None:

@@ -204,8 +204,8 @@ def driver(system: System, name: str) -> Driver:
         raise Rejected(Diagnostic("DRIVE100", f"the plan names no program for the node {node.name}", hint=hint))
     place = source.place.at("source")
     if source.kind is Driving.STEP:
-        text = f"{source.class_name} is a class with a method step, which has no topics: `hypothesis` drives it"
-        raise Rejected(Diagnostic("DRIVE100", text, place, hint="a class with callbacks has  kind: rospy  or  rclpy"))
+        text = f"kind is step, by default: {source.class_name} is driven by its method step, and has no topics"
+        raise Rejected(Diagnostic("DRIVE100", text, place, hint="add `kind: rclpy` or `kind: rospy` for callbacks"))
     root = plan.root.resolve()
     path = inside(root, source.python)
     if path is None or not path.is_file():
