@@ -9,6 +9,7 @@ time comes first. Time stands still while a callback runs.
 from __future__ import annotations
 
 import copy
+import difflib
 import heapq
 import json
 import sys
@@ -200,6 +201,15 @@ class Driven(Refusals, Messages):
         sys.meta_path.insert(0, Finder(self, frozenset(packages)))
 
 
+def _meant(error: Exception) -> str:
+    """The attribute that was probably meant by a missing one."""
+    made = getattr(error, "obj", None)
+    known = [name for name in dir(made) if isinstance(error, AttributeError) and not name.startswith("_")]
+    kind = made if isinstance(made, type) else type(made)
+    near = difflib.get_close_matches(str(getattr(error, "name", "")), known, 1)
+    return f": did you mean {kind.__name__}.{near[0]}?" if near else ""
+
+
 def answers(driven: Driven, make: Callable[[Any, Any], Any]) -> Callable[[Any, Any], Callable[[str], str]]:
     """The driver of a class: given the class and its specification, a function from a case to its result. `make` makes
     an object."""
@@ -226,9 +236,8 @@ def answers(driven: Driven, make: Callable[[Any, Any], Any]) -> Callable[[Any, A
                 if threading.active_count() > 1:
                     driven.refuse("a thread of its own")
             except Exception as error:
-                wrong = f"{type(error).__name__}: {error}"[:300] + called_from(
-                    traceback.extract_tb(error.__traceback__)
-                )
+                wrong = f"{type(error).__name__}: {error}"[:300] + _meant(error)
+                wrong += called_from(traceback.extract_tb(error.__traceback__))
             return json.dumps(
                 {
                     "heard": {topic: kinds[0][0] for topic, kinds in driven.heard.items() if kinds},

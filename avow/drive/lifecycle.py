@@ -62,8 +62,10 @@ class LifecycleNode(Node):
         name = str(request.transition.label or known.get(number))
         return name in known.values() and self._avow_go(name) is TransitionCallbackReturn.SUCCESS
 
-    def create_lifecycle_publisher(self, msg_type: Any, topic: str, qos_profile: Any, **more: Any) -> Any:
-        self._avow_managed.append(self._avow_publisher(LifecyclePublisher, msg_type, topic, more))
+    def create_lifecycle_publisher(self, msg_type: Any, topic: str, qos_profile: Any = None, **more: Any) -> Any:
+        self._avow_managed.append(
+            super().create_publisher(msg_type, topic, qos_profile, _avow_made=LifecyclePublisher, **more)
+        )
         return self._avow_managed[-1]
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:

@@ -9,9 +9,26 @@ from __future__ import annotations
 import array
 import math
 import struct
+from collections import UserDict
 from typing import Any
 
+from .refusals import Strict
+
 INTEGERS = {f"{sign}int{bits}": (sign, bits) for sign in ("", "u") for bits in (8, 16, 32, 64)}
+
+
+class Fields(UserDict[str, Any]):
+    """The names of a message's fields; their types, with limits on lengths, are not known."""
+
+    def __getitem__(self, name: str) -> Any:
+        raise Strict._driven.refuse("the type of a field in get_fields_and_field_types()")
+
+
+class SlotTypes:
+    """They are refused, of a class and of its objects."""
+
+    def __get__(self, made: object, kind: type) -> Any:
+        raise Strict._driven.refuse(f"{kind.__name__}.SLOT_TYPES")
 
 
 class Messages:
@@ -58,6 +75,9 @@ class Messages:
 
         content: dict[str, Any] = {"__slots__": tuple(fields), "__init__": init, "__eq__": same, "__repr__": shown}
         content |= {"__hash__": None, "_type": name}
+        if self.kind == "rclpy":
+            content["get_fields_and_field_types"] = classmethod(lambda kind: Fields(dict.fromkeys(fields)))
+            content["SLOT_TYPES"] = SlotTypes()
         content |= {called: self._constant(kind, text) for called, kind, text in self.types[name]["constants"]}
         return type(name.partition("/")[2], (), content)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import enum
 import functools
 from typing import Any
 
@@ -11,20 +12,12 @@ from .refusals import Strict, nothing
 SECOND = 10**9
 DEFAULTS = {"raw": False, "autostart": True, "start_parameter_services": True, "enable_rosout": True}
 DEFAULTS |= {"allow_undeclared_parameters": False, "automatically_declare_parameters_from_overrides": False}
-OF_NODES: tuple[str, ...] = (
-    "create_",
-    "destroy_",
-    "get_",
-    "set_",
-    "add_",
-    "remove_",
-    "declare_",
-    "undeclare_",
-    "describe_",
-    "list_",
-)
-OF_NODES += ("has_", "count_", "resolve_", "publishers", "subscriptions", "timers", "services", "clients", "executor")
-OF_NODES += ("default_callback_group", "waitables", "guards")
+KEYWORDS = {*DEFAULTS, "callback_group", "event_callbacks", "qos_overriding_options", "content_filter_options", "clock"}
+KEYWORDS |= {"publisher_class", "context", "cli_args", "parameter_overrides", "rosout_qos_profile"}
+"""Keyword arguments of rclpy's Node and its methods: any other one is an error of the class, there as here."""
+OF_NODES: tuple[str, ...] = ("create_", "destroy_", "get_", "set_", "add_", "remove_", "declare_", "undeclare_")
+OF_NODES += ("describe_", "list_", "has_", "count_", "resolve_", "publishers", "subscriptions", "timers", "services")
+OF_NODES += ("clients", "executor", "default_callback_group", "waitables", "guards")
 """Prefixes of names of rclpy's Node: such a name that is missing here is refused; other names are the class's own."""
 
 
@@ -77,6 +70,55 @@ class Time(_Moment):
             return NotImplemented
         kind: Any = Duration if type(other) is Time else Time
         return kind(nanoseconds=self.nanoseconds - other.nanoseconds)
+
+
+def _policy(name: str, *words: str) -> Any:
+    """A policy of rclpy by its members; each has its older name too."""
+    known = {word: number for number, word in enumerate(words) if word}
+    older = {f"RMW_QOS_POLICY_{name.upper()}_{word}": number for word, number in known.items()}
+    return enum.IntEnum(f"{name}Policy", {**known, **older})
+
+
+POLICIES = {
+    "history": _policy("History", "SYSTEM_DEFAULT", "KEEP_LAST", "KEEP_ALL"),
+    "reliability": _policy("Reliability", "SYSTEM_DEFAULT", "RELIABLE", "BEST_EFFORT", "", "BEST_AVAILABLE"),
+    "durability": _policy("Durability", "SYSTEM_DEFAULT", "TRANSIENT_LOCAL", "VOLATILE", "", "BEST_AVAILABLE"),
+    "liveliness": _policy("Liveliness", "SYSTEM_DEFAULT", "AUTOMATIC", "", "MANUAL_BY_TOPIC", "", "BEST_AVAILABLE"),
+}
+SETTINGS: dict[str, Any] = {"history": 1, "depth": 10, "reliability": 1, "durability": 2, "lifespan": Duration()}
+SETTINGS |= {"deadline": Duration(), "liveliness": 0, "liveliness_lease_duration": Duration()}
+SETTINGS |= {"avoid_ros_namespace_conventions": False}
+"""The settings of a profile, with rmw's defaults."""
+
+
+class InvalidQoSProfileException(Exception):  # noqa: N818 - rclpy's name
+    """A profile without the depth that it needs."""
+
+
+class QoSProfile:
+    """Takes what rclpy's takes. Here every message arrives."""
+
+    def __init__(self, **named: Any) -> None:
+        if "depth" not in named and named.get("history", 1) == 1 and named.keys() <= SETTINGS.keys():
+            raise InvalidQoSProfileException("QoSProfile with the history KEEP_LAST needs depth=")
+        for name, value in {**SETTINGS, **named}.items():
+            setattr(self, name, value)
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        if name not in SETTINGS:
+            raise AssertionError(f"QoSProfile has {', '.join(SETTINGS)}, and no {name!r}")
+        kind = POLICIES.get(name, type(SETTINGS[name]))
+        if not isinstance(value, int if name in POLICIES else kind):
+            raise AssertionError(f"{name} of a QoSProfile is a {kind.__name__}, not {value!r}")
+        super().__setattr__(name, kind(value) if name in POLICIES else value)
+
+
+QOS: dict[str, Any] = {kind.__name__: kind for kind in (QoSProfile, InvalidQoSProfileException, *POLICIES.values())}
+QOS |= {f"QoS{kind.__name__}": kind for kind in POLICIES.values()}
+PROFILES = {"sensor_data": (1, 5, 2), "services_default": (1, 10), "parameters": (1, 1000)}
+PROFILES |= {"system_default": (0, 0, 0, 0)}
+"""The first settings of rclpy's profiles."""
+QOS |= {f"qos_profile_{n}": QoSProfile(**dict(zip(SETTINGS, v, strict=False))) for n, v in PROFILES.items()}
 
 
 class Log(Strict):
@@ -202,31 +244,38 @@ class Node(Parameters):
     def __init__(
         self, node_name: str, *, namespace: Any = None, use_global_arguments: bool = True, **more: Any
     ) -> None:
-        self._avow_plain("Node", more)
         Parameters.__init__(self)
+        self._avow_plain("Node", more)
 
-    def _avow_plain(self, called: str, more: dict[str, Any]) -> None:
+    def _avow_plain(self, called: str, more: dict[str, Any], qos: Any = 0, kinds: Any = int | QoSProfile) -> None:
         """Refuses what else is given, unless it is the default, or an exclusive group."""
         for name, given in more.items():
+            if name not in KEYWORDS:
+                instead = ": the depth of the queue is its qos_profile" if name == "queue_size" else ""
+                raise TypeError(f"{called}() has no argument {name!r}{instead}")
             if type(given) is MutuallyExclusiveCallbackGroup:
                 self._avow.groups.add(given)
             elif given is not DEFAULTS.get(name):
                 raise self._avow.refuse(f"rclpy.node.{called}({name}=)")
         if more.get("callback_group") is None:
             self._avow.groups.add(None)
+        if not isinstance(qos, kinds) or (isinstance(qos, int) and qos < 0):
+            text = f"qos_profile of {called}() is {qos!r}, and has to be a QoSProfile, or for a topic a depth from 0"
+            raise (ValueError if isinstance(qos, kinds) else TypeError)(text)
 
-    def create_subscription(self, msg_type: Any, topic: str, callback: Any, qos_profile: Any, **more: Any) -> Any:
-        self._avow_plain("Node.create_subscription", more)
+    def create_subscription(
+        self, msg_type: Any, topic: str, callback: Any, qos_profile: Any = None, **more: Any
+    ) -> Any:
+        self._avow_plain("Node.create_subscription", more, qos_profile)
         return Subscription(*self._avow.hear(topic, msg_type, callback))
 
-    def create_publisher(self, msg_type: Any, topic: str, qos_profile: Any, **more: Any) -> Any:
-        return self._avow_publisher(Publisher, msg_type, topic, more)
-
-    def _avow_publisher(self, made: Any, msg_type: Any, topic: str, more: dict[str, Any]) -> Any:
+    def create_publisher(
+        self, msg_type: Any, topic: str, qos_profile: Any = None, *, _avow_made: Any = Publisher, **more: Any
+    ) -> Any:
         groups = set(self._avow.groups)
-        self._avow_plain("Node.create_publisher", more)
+        self._avow_plain("Node.create_publisher", more, qos_profile)
         self._avow.groups = groups  # a publisher has no callbacks
-        return made(self._avow.speak(topic, msg_type), msg_type)
+        return _avow_made(self._avow.speak(topic, msg_type), msg_type)
 
     def create_timer(self, timer_period_sec: float, callback: Any, callback_group: Any = None, **more: Any) -> Any:
         self._avow_plain("Node.create_timer", {"callback_group": callback_group, **more})
@@ -235,13 +284,11 @@ class Node(Parameters):
         return Timer(int(float(timer_period_sec) * SECOND), callback)
 
     def create_service(self, srv_type: Any, srv_name: str, callback: Any, **more: Any) -> Any:
-        more.pop("qos_profile", None)
-        self._avow_plain("Node.create_service", more)
+        self._avow_plain("Node.create_service", more, more.pop("qos_profile", QoSProfile(depth=10)), QoSProfile)
         return Service(srv_type, srv_name, callback)
 
     def create_client(self, srv_type: Any, srv_name: str, **more: Any) -> Any:
-        more.pop("qos_profile", None)
-        self._avow_plain("Node.create_client", more)
+        self._avow_plain("Node.create_client", more, more.pop("qos_profile", QoSProfile(depth=10)), QoSProfile)
         return Client(srv_type, srv_name)
 
     def destroy_timer(self, timer: Timer) -> bool:
@@ -278,6 +325,8 @@ class Node(Parameters):
         raise self._avow.refuse("rclpy.node.Node.destroy_node")
 
     def __getattr__(self, name: str) -> Any:
+        if name in ("_avow", "_avow_declared"):
+            raise RuntimeError(f"{type(self).__name__} is used before its __init__ calls super().__init__(name)")
         if name.startswith(OF_NODES) or name in ("context", "handle"):
             raise self._avow.refuse(f"rclpy.node.Node.{name}")
         raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")

@@ -85,9 +85,8 @@ class Parameter(Strict):
 class Parameters:
     """The parameters of a node."""
 
-    _avow = property(lambda self: Strict._driven)
-
     def __init__(self) -> None:
+        self._avow = Strict._driven
         self._avow_declared: dict[str, Parameter] = {}
         self._avow_described: dict[str, Any] = {}
         self._avow_asked: list[Callable[[list[Parameter]], Any]] = []
@@ -106,7 +105,8 @@ class Parameters:
         free = getattr(descriptor, "dynamic_typing", False) or kind is Parameter.Type.NOT_SET
         if at is not None and made.type_ is not kind and not free:
             text = kind.name if typed is not None else repr(value)
-            raise InvalidParameterTypeException(f"the parameter {name} is declared as {text}, and set to {at!r}")
+            mend = f": write {at}.0" if (kind, type(at)) == (Parameter.Type.DOUBLE, int) else ""
+            raise InvalidParameterTypeException(f"the parameter {name} is declared as {text}, and set to {at!r}{mend}")
         self._avow_described[name] = descriptor
         result = self._avow_set([made], first=True)
         if not result.successful:

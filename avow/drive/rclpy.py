@@ -13,7 +13,7 @@ from typing import Any
 from . import filters, lifecycle, parameters
 from .callbacks import Driven, answers
 from .messages import INTEGERS
-from .nodes import ENTITIES, Duration, Future, Log, MutuallyExclusiveCallbackGroup, Node, Time
+from .nodes import ENTITIES, QOS, Duration, Future, Log, MutuallyExclusiveCallbackGroup, Node, Time
 from .refusals import Strict
 
 SECOND = 10**9
@@ -32,7 +32,7 @@ def modules(spec: Any, own: Sequence[str]) -> Callable[[Any, Any], Callable[[str
         "node": {"Node": Node},
         "time": {"Time": Time},
         "duration": {"Duration": Duration},
-        "qos": _qos(),
+        "qos": QOS,
         "callback_groups": {"MutuallyExclusiveCallbackGroup": MutuallyExclusiveCallbackGroup},
         "executors": {kind.__name__: kind for kind in (SingleThreadedExecutor, MultiThreadedExecutor, _Shutdown)},
         "exceptions": parameters.EXCEPTIONS,
@@ -136,23 +136,3 @@ class _World(Driven):
         if wire.startswith("float"):
             return isinstance(value, float) and (not abs(value) > LARGEST[wire] or math.isinf(value))
         return isinstance(value, bool if wire == "bool" else str)
-
-
-def _qos() -> dict[str, Any]:
-    class QoSProfile:
-        """Queue sizes and reliability: here every message arrives."""
-
-        def __init__(self, **named: Any) -> None:
-            vars(self).update(named)
-
-    qos: dict[str, Any] = {"QoSProfile": QoSProfile}
-    for short, words in (
-        ("Reliability", ("RELIABLE", "BEST_EFFORT", "SYSTEM_DEFAULT", "BEST_AVAILABLE")),
-        ("Durability", ("VOLATILE", "TRANSIENT_LOCAL", "SYSTEM_DEFAULT", "BEST_AVAILABLE")),
-        ("History", ("KEEP_LAST", "KEEP_ALL", "SYSTEM_DEFAULT")),
-        ("Liveliness", ("AUTOMATIC", "MANUAL_BY_TOPIC", "SYSTEM_DEFAULT", "BEST_AVAILABLE")),
-    ):
-        content = {"_called": f"rclpy.qos.{short}Policy", **{word: f"{short}Policy.{word}" for word in words}}
-        qos |= dict.fromkeys((f"{short}Policy", f"QoS{short}Policy"), type(f"{short}Policy", (Strict,), content)())
-    profiles = [f"qos_profile_{name}" for name in ("sensor_data", "system_default", "services_default", "parameters")]
-    return qos | {name: QoSProfile(depth=10) for name in profiles}

@@ -15,27 +15,9 @@ import types
 from collections.abc import Sequence
 from typing import Any, ClassVar
 
-FOREIGN: tuple[str, ...] = (
-    "rospy",
-    "rclpy",
-    "roslib",
-    "rosgraph",
-    "rospkg",
-    "actionlib",
-    "tf",
-    "tf2_ros",
-    "tf2_py",
-    "message_filters",
-)
-FOREIGN += (
-    "dynamic_reconfigure",
-    "cv_bridge",
-    "genpy",
-    "ros_numpy",
-    "rosbag",
-    "ament_index_python",
-    "tf_transformations",
-)
+FOREIGN: tuple[str, ...] = ("rospy", "rclpy", "roslib", "rosgraph", "rospkg", "rosbag", "actionlib", "genpy")
+FOREIGN += ("tf", "tf2_ros", "tf2_py", "tf_transformations", "message_filters", "dynamic_reconfigure", "ros_numpy")
+FOREIGN += ("ament_index_python", "cv_bridge")
 CLOCKS: tuple[str, ...] = ("time", "monotonic", "perf_counter", "process_time", "thread_time", "clock_gettime")
 CLOCKS += (*(f"{name}_ns" for name in CLOCKS), "localtime", "gmtime", "ctime", "strftime", "sleep")
 

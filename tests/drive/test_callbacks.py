@@ -153,6 +153,7 @@ def test_a_class_runs_as_it_is_and_its_recording_replays(tmp_path: Path, kind: s
         ("w: {ros__parameters: {redd: 250.0}}", 0, "the parameter redd is set, and the class declares red"),
         ("redd: 250.0", 0, "the parameter redd is set, and the class declares red"),
         ("w: {ros__parameters: {red: '250'}}", 0, "is declared as 100.0, and set to '250'"),
+        ("w: {ros__parameters: {red: 250}}", 0, "is declared as 100.0, and set to 250: write 250.0"),
     ],
 )
 def test_a_class_has_the_parameters_that_ros2_reads(tmp_path: Path, parameters: str, reds: int, told_: str) -> None:
@@ -298,7 +299,10 @@ def test_fields_of_ros_2_take_what_its_setters_take(tmp_path: Path) -> None:
 
 UNSUPPORTED = {  # what of rclpy is used, and what is told besides its name and line
     "self.context": "rclpy.node.Node.context (watch.py, line {})",
-    "from rclpy.qos import HistoryPolicy as H; H.LATEST": "rclpy.qos.HistoryPolicy.LATEST (watch.py, line {})",
+    "message.SLOT_TYPES": "Float64.SLOT_TYPES (watch.py, line {})",
+    "assert [*String.get_fields_and_field_types()] == ['data']; String.get_fields_and_field_types()['data']": (
+        "the type of a field in get_fields_and_field_types() (watch.py, line {})"
+    ),
     "self.get_logger().fatally": "RcutilsLogger.fatally (watch.py, line {})",
     "self.create_guard_condition(print)": "rclpy.node.Node.create_guard_condition (watch.py, line {})",
     "self.add_pre_set_parameters_callback(print)": "Node.add_pre_set_parameters_callback (watch.py, line {})",
@@ -321,6 +325,40 @@ def test_what_of_ros_2_is_not_driven_has_its_line_and_an_alternative(tmp_path: P
     assert [why for why in wanted if why not in found] == [], found
 
 
+QOS = 'self.said = self.create_publisher(String, "status", qos)'
+WRONG = [  # what rclpy rejects when a node is made: a text of it, what is in its place, and the error
+    (
+        QOS,
+        QOS.replace("qos", "queue_size=1"),
+        "TypeError: Node.create_publisher() has no argument 'queue_size': the de",
+    ),
+    (
+        QOS,
+        QOS.replace("qos", "'1'"),
+        "TypeError: qos_profile of Node.create_publisher() is '1', and has to be a QoSProf",
+    ),
+    (
+        QOS,
+        QOS.replace("qos", "-1"),
+        "ValueError: qos_profile of Node.create_publisher() is -1, and has to be a QoSProf",
+    ),
+    ("self.heard, 10", "self.heard", "TypeError: qos_profile of Node.create_subscription() is None, and has to be a Q"),
+    ("depth=1, ", "", "InvalidQoSProfileException: QoSProfile with the history KEEP_LAST needs depth="),
+    ("reliability=", "reliabilty=", "AssertionError: QoSProfile has history, depth, reliability, "),
+    ("=ReliabilityPolicy.RELIABLE", "='reliable'", "AssertionError: reliability of a QoSProfile is a ReliabilityPol"),
+    ("RELIABLE)", "RELIABEL)", "AttributeError: RELIABEL: did you mean ReliabilityPolicy.RELIABLE?"),
+    ('super().__init__("watch")', "pass", "Watch is used before its __init__ calls super().__init__(name)"),
+]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("old", "new", "why"), some(WRONG, 3))
+def test_what_rclpy_rejects_is_an_error_of_the_class(tmp_path: Path, old: str, new: str, why: str) -> None:
+    found = told(drive(system(tmp_path / "w", "rclpy", ROS2.replace(old, new)), "watch"))
+    assert f"Watch is not made: {why}" in found or f"RuntimeError: {why}" in found
+    assert "(watch.py, line 1" in found
+
+
 @pytest.mark.slow
 def test_typed_parameter_values_and_exclusive_groups_are_driven(tmp_path: Path) -> None:
     values = {"True": "bool", "3": "integer", "2.5": "double", "'a'": "string", "[True]": "bool_array"}
@@ -338,6 +376,9 @@ def test_typed_parameter_values_and_exclusive_groups_are_driven(tmp_path: Path) 
         array_of = "list" if value.startswith("[") else ""
         lines += f"\n        same = {array_of}(held.{kind}_value) == {value}"
         lines += f"\n        if others or not same: wrong.append('{kind}')"
+    lines += "\n        from rclpy.qos import DurabilityPolicy as D, QoSProfile as Q, qos_profile_sensor_data as s"
+    lines += "\n        assert Q(depth=1, durability=D.RMW_QOS_POLICY_DURABILITY_TRANSIENT_LOCAL).durability == 1"
+    lines += "\n        assert Q(history=2).depth == 10 and (s.depth, s.reliability) == (5, 2)"
     lines += "\n        assert wrong == [], wrong"
     done = drive(system(tmp_path / "w", "rclpy", ROS2.replace("# HERE", lines)), "watch", trace(tmp_path))
     assert done.return_value == 0, (done.output, done.exception)
