@@ -9,6 +9,7 @@ values of the contract as plain Python: an element of an enumeration is a string
 from __future__ import annotations
 
 import enum
+import faulthandler
 import importlib.machinery
 import importlib.util
 import inspect
@@ -16,6 +17,7 @@ import itertools
 import json
 import os
 import random
+import signal
 import sys
 import tempfile
 import traceback
@@ -133,7 +135,13 @@ def load(path: str, name: str, function: str, drive: Any = None) -> Any:
     try:
         spec.loader.exec_module(module)
     except ModuleNotFoundError as error:
-        near = _near(str(error.name), {name.partition(".")[0] for name in sys.modules})
+        package, _, last = str(error.name).rpartition(".")
+        places = list(getattr(sys.modules.get(package), "__path__", ()))
+        if places:  # the package is there, and not its module
+            near = f": {os.path.relpath(places[0])} has no {last}.py"
+            near += _near(last, {os.path.splitext(file)[0] for file in os.listdir(places[0])})  # noqa: PTH122, PTH208
+        else:
+            near = _near(str(error.name), {name.partition(".")[0] for name in sys.modules})
         near = near or f": install it where Avow runs, or put its file beside {os.path.basename(path)}"  # noqa: PTH119
         error.msg += near if error.msg.startswith("No module") else ""
         raise
@@ -265,8 +273,8 @@ def _told(error: BaseException) -> str:
         frames = [f for f in traceback.extract_tb(error.__traceback__) if not f.filename.startswith("<")]
         own = [frame for frame in frames if not os.path.realpath(frame.filename).startswith(ours)]
         where = f" ({os.path.basename(own[-1].filename)}, line {own[-1].lineno})" if own else ""  # noqa: PTH119
-        relative = isinstance(error, ImportError) and "relative import" in str(error)
-        hint = "; instead: `from NAME import …`, as the file's folder is searched" if relative else ""
+        relative = isinstance(error, ImportError) and "no known parent package" in str(error)
+        hint = "; a relative import needs the file in the folder of its package, with `__init__.py`" if relative else ""
         return f"{type(error).__name__}: {error}"[:500] + where + hint
     except BaseException:
         return type(error).__name__
@@ -277,6 +285,7 @@ def main() -> None:
     source, sink = int(sys.argv[4]), int(sys.argv[5])
     sys.argv[:], sys.orig_argv[:] = [path], [sys.executable, path]  # the same at every run
     with os.fdopen(source, "r", encoding="utf-8") as requests, os.fdopen(sink, "w", encoding="utf-8") as answers:
+        faulthandler.register(signal.SIGUSR1, answers.fileno(), all_threads=False)  # as `SubjectProcess._place` asks
         random.seed(0)
         name, folders, looked = places(path, os.path.realpath(root))
         drive = driving(function, folders)

@@ -6,7 +6,9 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import re
 import select
+import signal
 import subprocess
 import sys
 import tempfile
@@ -135,8 +137,24 @@ class SubjectProcess:
 
     def _wait(self, reading: Sequence[int], writing: Sequence[int], end: float) -> None:
         if not any(select.select(reading, writing, [], max(0.0, end - time.monotonic()))):
-            self.silent = f"the subject does not answer within {self.patience:g} s"
+            self.silent = f"the subject does not answer within {self.patience:g} s{self._place()}"
             raise self._end(self.silent)
+
+    def _place(self) -> str:
+        """The line of the program's own files that is executed, as its process writes it (`host.main`)."""
+        text = b""
+        if self.isolation is Isolation.SEALED or self.process is None:
+            return ""
+        with contextlib.suppress(OSError):
+            os.kill(self.process.pid, signal.SIGUSR1)
+            while not text.endswith(b"in <module>\n") and select.select([self._from], [], [], 0.5)[0]:
+                part = os.read(self._from, 1 << 16)
+                text += part
+                if not part or len(text) > 1 << 16:
+                    break
+        places = re.findall(r'File "(.+)", line (\d+) in (\w+)', text.decode("utf-8", "replace"))
+        own = [place for place in places if Path(place[0]).is_relative_to(self.root)]
+        return f": it is in {own[0][2]} ({Path(own[0][0]).name}, line {own[0][1]})" if own else ""
 
     def _written(self, cases: Sequence[Mapping[str, Any]]) -> bytes:
         """The cases as the process reads them: one line."""

@@ -12,6 +12,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 SECTION = "ros__parameters"
+SLIP = SECTION.replace("__", "_")
 
 
 class WrongParameters(Exception):  # noqa: N818 - it is what was found wrong
@@ -20,7 +21,7 @@ class WrongParameters(Exception):  # noqa: N818 - it is what was found wrong
 
 def is_sectioned(data: object) -> bool:
     """Whether it is a parameter file of ROS 2, not a plain mapping."""
-    return isinstance(data, Mapping) and (SECTION in data or any(map(is_sectioned, data.values())))
+    return isinstance(data, Mapping) and (SECTION in data or SLIP in data or any(map(is_sectioned, data.values())))
 
 
 def of_node(data: Mapping[str, Any], name: str) -> dict[str, Any]:
@@ -72,6 +73,8 @@ def nested(settings: Mapping[str, Any]) -> dict[str, Any]:
 def _entries(data: Mapping[str, Any], before: str) -> Iterator[tuple[str, Mapping[str, Any]]]:
     for key, value in data.items():
         name = f"{before}/{str(key).strip('/')}"
+        if key == SLIP:
+            raise WrongParameters(f"{before or '/'} has `{SLIP}`: write `{SECTION}`, with two underscores")
         if not isinstance(value, Mapping):
             raise WrongParameters(f"{name} is neither a node with `{SECTION}` nor a namespace")
         if SECTION not in value:

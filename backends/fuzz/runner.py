@@ -68,6 +68,9 @@ class _Program(SubjectProcess):
         built = str(self.path.parent) + os.sep
         return recorded(each for each in self._looked if not each[1].startswith(built))
 
+    def _place(self) -> str:
+        return ""
+
     def _command(self, there: int, back: int) -> list[str]:
         return [str(self.path), str(there), str(back)]
 

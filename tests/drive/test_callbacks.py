@@ -150,6 +150,7 @@ def test_a_class_runs_as_it_is_and_its_recording_replays(tmp_path: Path, kind: s
         ("'/**': {ros__parameters: {red: 1.0, use_sim_time: true}}\nw: {ros__parameters: {red: 250.0}}", 2, ""),
         ("'/**': {ros__parameters: {red: 1000.0}}", 0, ""),
         ("other: {ros__parameters: {red: 250.0}}", 0, "sets nothing for /w, but for /other"),
+        ("w: {ros_parameters: {red: 250.0}}", 0, "/w has `ros_parameters`: write `ros__parameters`, with two"),
         ("w: {ros__parameters: {redd: 250.0}}", 0, "the parameter redd is set, and the class declares red"),
         ("redd: 250.0", 0, "the parameter redd is set, and the class declares red"),
         ("w: {ros__parameters: {red: '250'}}", 0, "is declared as 100.0, and set to '250'"),
@@ -430,12 +431,13 @@ def test_what_a_callback_raises_has_its_message_topic_and_line(tmp_path: Path, k
 
 
 LOADED = [  # the first line of the file, and what is told if it cannot be loaded
-    ("from .helper import x", "no known parent package (watch.py, line 1); instead: `from NAME import"),
+    ("from .helper import x", "no known parent package (watch.py, line 1); a relative import needs the file in the"),
     ("from rospy import Rate", "Rate is not driven; instead: Timer (watch.py, line 1)"),
     (
         "import no_such_module",
         "'no_such_module': install it where Avow runs, or put its file beside watch.py (watch.py",
     ),
+    ("import json.decode", "json has no decode.py: did you mean decoder? (watch.py, line 1)"),
     ("import std_msg.msg", "No module named 'std_msg': did you mean std_msgs? (watch.py, line 1)"),
     ("1 / 0", "division by zero (watch.py, line 1)"),
 ]
