@@ -26,6 +26,7 @@ _WORDS = {
     "unowned": ("assumption{s} without owner or end", "without owner", "Nobody keeps them true, or they never end."),
     "sampled": ("claim{s} sampled, not proved", "sampled", "Other inputs and other runs may behave otherwise."),
     "unanswered": ("claim{s} with unanswered inputs", "unanswered", "The evidence says nothing of these inputs."),
+    "nan": ("claim{s} broken by NaN or infinity", "broken by NaN", "The contract is about numbers only."),
     "read": ("guarantee{s} on a person's reading only", "only read", "No tool has looked at them."),
     "single": ("guarantee{s} with one method only", "by one method", "An error of that tool would not be noticed."),
     "tied": (
@@ -89,6 +90,7 @@ def deficits(
         "unowned": [s.key for s in assumptions if not s.owned],
         "sampled": [v.id for v in leaves if _status(v, relied) in (Status.TESTED, Status.MONITORED)],
         "unanswered": [v.id for v in leaves if any(e.entry.evidence.bound.get("unanswered") for e in v.counting)],
+        "nan": [v.id for v in leaves if any(e.entry.evidence.details.get("no numbers") for e in v.counting)],
         "read": [v.id for v in guarantees if _status(v, relied) is Status.REVIEWED],
         "single": list(single),
         "tied": [v.id for v in guarantees if v.id in relied and _by_hand(v, relied[v.id])],
