@@ -51,7 +51,7 @@ def test_the_examples_pass(place: Path) -> None:
         ('Verdict.TESTED, f"{len', 'Verdict.PROVED, f"{len', "test_seeded_verdicts"),
         ("Counterexample(tuple(", "None and Counterexample(tuple(", "test_seeded_verdicts"),
         ("for o in job.obligations)", "for o in job.obligations[:1])", "test_seeded_verdicts"),
-        ("Verdict.ERROR, told(", "Verdict.TESTED, told(", "test_files_that_are_missing"),
+        ("Verdict.ERROR, summarized(", "Verdict.TESTED, summarized(", "test_files_that_are_missing"),
         ('    version = "1"\n', "", "test_it_keeps_the_promise"),
         ("uses_scenario = False", "uses_scenario = 0", "test_it_keeps_the_promise"),
         ('"additionalProperties": False', '"additionalProperties": "no"', "test_the_schema_is_one"),
