@@ -76,7 +76,7 @@ def test_a_right_class_is_tested_and_no_more(tmp_path: Path) -> None:
     assert {o.of for o in found.values()} == {None}  # a model, and not the node's own class
     shown = found["later"].counterexample
     assert shown is not None
-    assert [dict(step)["in.request"] for step in shown.trace] == ["TRUE", "FALSE", "TRUE"]
+    assert [dict(step)["in.request"] for step in shown.trace][-3:] == ["TRUE", "FALSE", "TRUE"]
 
 
 @pytest.mark.slow
