@@ -278,8 +278,8 @@ class Paired:
         first = low if self._by == "latency" and pairing.waiting else max(low, first)
         pairing.input(name)
         keys = [*self._numbers] if self._by != "latency" else []
-        for k in range(low, first if keys else low):
-            pairing.heard(name, keys[one.ids[k]])
+        for k in one.ids[low : first if keys else low].tolist():
+            pairing.heard(name, keys[k])
         for k in range(first, high):
             row = int(one.rows[k])
             event, key = self._batch.event(row), keys[one.ids[k]] if keys else None

@@ -123,13 +123,13 @@ class Replies:
     """Which inputs of one guarantee got no answer, although a later one did."""
 
     watched: Watched
-    came: dict[object, set[str]] = field(default_factory=dict)
+    came: OrderedDict[object, set[str]] = field(default_factory=OrderedDict)
     """For each key, the inputs that have come, while others have not."""
-    waiting: dict[object, None] = field(default_factory=dict)
+    waiting: OrderedDict[object, None] = field(default_factory=OrderedDict)
     """The keys of inputs that are later than all answered ones."""
-    passed: dict[object, None] = field(default_factory=dict)
+    passed: OrderedDict[object, None] = field(default_factory=OrderedDict)
     """The keys of earlier ones without an answer."""
-    answered: dict[object, None] = field(default_factory=dict)
+    answered: OrderedDict[object, None] = field(default_factory=OrderedDict)
 
     def heard(self, name: str, key: object) -> None:
         if key is None or name not in self.watched.paired:
@@ -147,10 +147,10 @@ class Replies:
         self.answered[key] = None
         self.passed.pop(key, None)
         if key in self.waiting:
-            keys = [*self.waiting]
-            at = keys.index(key)
-            self.passed |= dict.fromkeys(keys[:at])
-            self.waiting = dict.fromkeys(keys[at + 1 :])
+            earlier = self.waiting.popitem(last=False)[0]
+            while earlier is not key and earlier != key:
+                self.passed[earlier] = None
+                earlier = self.waiting.popitem(last=False)[0]
         _bound(self.passed, self.answered)
         self.watched.tally.unanswered = len(self.passed)
 
@@ -160,10 +160,10 @@ class Replies:
         self.waiting.pop(key, None)
 
 
-def _bound(*kept: dict[object, Any]) -> None:
+def _bound(*kept: OrderedDict[object, Any]) -> None:
     for keys in kept:
         if len(keys) > UNANSWERED_KEPT:
-            del keys[next(iter(keys))]
+            keys.popitem(last=False)
 
 
 Choices = list[list[InputMessage]] | str
