@@ -11,6 +11,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import field
 
 from avow.base.records import dataclass
+from avow.base.suggestions import suggest
 
 INTEGERS: Mapping[str, tuple[int, int]] = {
     **{f"int{bits}": (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1) for bits in (8, 16, 32, 64)},
@@ -68,6 +69,8 @@ Wire = Scalar | Nested | Array
 class Field:
     name: str
     wire: Wire
+    line: int = field(default=0, compare=False)
+    """Its line in the message's file."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,9 +95,9 @@ class Message:
 class WrongDefinition(Exception):  # noqa: N818 - it is what was found wrong
     """A text that does not define a message; `line` counts from 1."""
 
-    def __init__(self, message: str, line: int) -> None:
+    def __init__(self, message: str, line: int, hint: str | None = None) -> None:
         super().__init__(message)
-        self.line = line
+        self.line, self.hint = line, hint
 
 
 class NoField(Exception):  # noqa: N818 - it is what was found wrong
@@ -211,8 +214,12 @@ def parse_message(text: str, name: str, source: str = "") -> Message:
         found = _FIELD.match(line)
         if found is None:
             raise WrongDefinition(f"{line[:60]!r} is neither `type name` nor `type NAME=value`", number)
-        scalar = _scalar(found["type"], package)
-        rest = found["rest"]
+        scalar, rest = _scalar(found["type"], package), found["rest"]
+        if isinstance(scalar, Nested) and re.fullmatch(
+            "[a-z][^/]*", found["type"]
+        ):  # a message's begins with a capital
+            hint = suggest(found["type"], sorted((*SCALARS, *OTHER_NAMES, "Header")))
+            raise WrongDefinition(f"there is no type {found['type']}", number, hint)
         if rest.startswith("="):
             if not isinstance(scalar, Scalar) or found["array"]:
                 raise WrongDefinition(f"the constant {found['name']} has no built-in type", number)
@@ -222,11 +229,9 @@ def parse_message(text: str, name: str, source: str = "") -> Message:
             continue
         if found["name"] in fields:
             raise WrongDefinition(f"the field {found['name']} is listed twice", number)
-        wire: Wire = scalar
-        if found["array"]:
-            size = found["size"]
-            wire = Array(scalar, int(size) if size.isdigit() else None)
-        fields[found["name"]] = Field(found["name"], wire)
+        size = found["size"] or ""
+        wire = Array(scalar, int(size) if size.isdigit() else None) if found["array"] else scalar
+        fields[found["name"]] = Field(found["name"], wire, number)
     return Message(name, tuple(fields.values()), tuple(constants), source)
 
 
@@ -264,7 +269,7 @@ def parse_parts(text: str, name: str, kind: str, source: str = "") -> tuple[Mess
         try:
             found.append(parse_message("\n".join(part), f"{name}_{suffix}", source))
         except WrongDefinition as wrong:
-            raise WrongDefinition(str(wrong), wrong.line + before) from None
+            raise WrongDefinition(str(wrong), wrong.line + before, wrong.hint) from None
         before += len(part) + 1
     return tuple(found)
 

@@ -122,7 +122,7 @@ def _of_file(path: Path, faults: list[Diagnostic]) -> tuple[Message, ...]:
             return _of_idl(text, str(path))
         return parse_parts(text, name, kind, str(path)) if kind != "msg" else (parse_message(text, name, str(path)),)
     except WrongDefinition as wrong:
-        faults.append(Diagnostic("ROS101", f"{name}: {wrong}", _at(path, wrong.line)))
+        faults.append(Diagnostic("ROS101", f"{name}: {wrong}", _at(path, wrong.line), hint=wrong.hint))
     except (OSError, ValueError) as error:
         faults.append(Diagnostic("ROS101", f"{name} cannot be read: {error}", _at(path, 1)))
     return ()

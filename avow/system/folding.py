@@ -173,8 +173,7 @@ def face(system: System, graph: Graph, name: str, inside: Iterable[str]) -> Face
                 known[value] = Endpoint(name, inputs[-1].name)
             inlets[at] = known[value]
     span = next((s.span for s in system.plan.subsystems if s.name == name), None)
-    whole = Node(name, tuple(inputs), tuple(outputs), (), (), (), span)
-    return Face(whole, held, ports, outlets, inlets)
+    return Face(Node(name, tuple(inputs), tuple(outputs), (), (), (), span), held, ports, outlets, inlets)
 
 
 def fold(system: System, graph: Graph, faces: Iterable[Face]) -> Folded:
@@ -216,8 +215,7 @@ def seen(system: System, graph: Graph) -> tuple[tuple[str, Graph], ...]:
     found = [("", fold(system, graph, (faces[n] for n in outermost(system) if n in faces)).graph)]
     for name in reversed(inner_first(plan)):
         members = next(s.members for s in plan.subsystems if s.name == name)
-        part = fold(system, graph, (faces[m] for m in members if m in faces)).graph
-        found.append((name, restricted(part, members)))
+        found.append((name, restricted(fold(system, graph, (faces[m] for m in members if m in faces)).graph, members)))
     return tuple(found)
 
 

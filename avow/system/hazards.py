@@ -55,8 +55,7 @@ def read_hazards(
             )
             continue
         try:
-            data = read_regular(path)
-            hazards, wrong = (_table if path.suffix.lower() == ".csv" else _document)(data, str(path))
+            hazards, wrong = (_table if path.suffix.lower() == ".csv" else _document)(read_regular(path), str(path))
         except OSError as error:
             message = f"{piece.text!r} cannot be read: {error.strerror}"
             faults.append(Diagnostic("PLAN107", message, piece.span))

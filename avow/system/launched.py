@@ -70,8 +70,7 @@ def started(plan: Plan, contract: Contract) -> tuple[Plan, tuple[Diagnostic, ...
             faults += (*_disagreements(node, mine, launched), *_parameters(plan, node, launched))
             remaps = (*launched.remaps, *(mine.remaps if launched.unread else ()))
             placed[node.name] = Placed(launched.name, remaps, launched.span, True, True)
-    names = Resolver(tuple(placed.items()))
-    return replace(plan, ros=replace(plan.ros, names=names)), tuple(faults)
+    return replace(plan, ros=replace(plan.ros, names=Resolver(tuple(placed.items())))), tuple(faults)
 
 
 def _parameters(plan: Plan, node: Node, launched: Started) -> Iterator[Diagnostic]:

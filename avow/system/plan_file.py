@@ -62,8 +62,7 @@ def read_plan(
     if faults:
         raise Rejected(*faults)
     reader = _PlanReader(path, root)
-    plan = reader.plan()
-    return plan, root, tuple(reader.faults)
+    return reader.plan(), root, tuple(reader.faults)
 
 
 def read_rest(path: Path) -> tuple[Plan, Piece, tuple[Diagnostic, ...], frozenset[str]]:

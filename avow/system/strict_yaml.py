@@ -121,7 +121,9 @@ def read_yaml(data: bytes, file: str) -> tuple[Piece, tuple[Diagnostic, ...]]:
         shown = f"character U+{ord(text[error.position]):04X}" if error.position < len(text) else "a character"
         raise Rejected(_error(f"{shown} does not belong in YAML", file, line, column)) from None
     except yaml.MarkedYAMLError as error:
-        mark = error.problem_mark or error.context_mark
+        mark, begun = error.problem_mark or error.context_mark, error.context_mark
+        if begun and re.search("flow|simple key|quoted", error.context or ""):
+            mark = begun  # what is not ended is the fault, not the line at which that is noticed
         line, column = (mark.line + 1, mark.column + 1) if mark else (1, 1)
         problem, hint = _in_words(error.problem or "not YAML")
         raise Rejected(_error(problem, file, line, column, hint)) from None
@@ -135,13 +137,13 @@ _PROBLEMS = (
     (
         r"mapping values are not allowed",
         "a `:` stands where no key can be",
-        "check the indentation, or put the text in quotes",
+        "check the indentation of this line and of the line before, or put the text in quotes",
     ),
     (r"could not find expected ':'", "a key without its `:`", "write `key: value`"),
     (
         r"expected <block end>, but found '(.*)'",
         "this line is indented as none above it",
-        "the keys of a mapping, and the items of a list, stand in one column: compare with the line above",
+        "the keys of a mapping, and the items of a list, stand in one column: move this line, or those above it",
     ),
     (r"expected ',' or '(.)'", "a `,` or the closing `{0}` is missing", None),
     (r"unexpected end of stream|found document separator", "a quotation mark or a bracket is not closed", None),
@@ -253,10 +255,8 @@ class _Builder:
             raise self.reject(event, "PLAN102", "a key must be plain text")
         piece = self.anchors.get(event.anchor)
         if piece is None:
-            hint = (
-                did_you_mean(event.anchor, self.anchors)
-                or f"write the value here, or `&{event.anchor}` before it above"
-            )
+            near = did_you_mean(event.anchor, self.anchors)
+            hint = near or f"write the value here, or `&{event.anchor}` before it above"
             raise self.reject(event, "PLAN101", f"the alias *{event.anchor} is used before or without its anchor", hint)
         self.put(event, piece)
 
@@ -272,8 +272,7 @@ class _Builder:
         frame.key = key
         if key == "<<":
             self.problem(event, "PLAN102", "merge keys (<<) are not read; write the keys out")
-        first = frame.piece.keys.setdefault(key, self.span(event))
-        if first != self.span(event):
+        if (first := frame.piece.keys.setdefault(key, self.span(event))) != self.span(event):
             self.problem(event, "PLAN102", f"the key {key!r} is given twice", ("first given here", first))
 
     def put(self, event: Any, piece: Piece) -> None:

@@ -14,12 +14,12 @@ from dataclasses import replace
 
 from avow.base.diagnostics import Diagnostic, Severity, Span
 from avow.base.records import dataclass
-from avow.base.suggestions import did_you_mean, nearest
+from avow.base.suggestions import did_you_mean, nearest, suggest
 from avow.language.contract import Clause, ClauseKind, Contract, Node, Port, Topic
 from avow.language.sorts import BOOL, FunctionSort
 from avow.language.terms import Apply, Compare, Iff, Or, Quantified, Quantifier, Role, Term, Variable
 from avow.ros.calls import CALL_PARTS, part_topic
-from avow.ros.definitions import canonical
+from avow.ros.definitions import Array, Definitions, Nested, canonical
 from avow.ros.names import Resolver
 from avow.ros.sources import definitions
 from avow.system.plan import Edge, Endpoint, Plan
@@ -88,12 +88,10 @@ def wrong_types(found: Ends) -> Iterator[Diagnostic]:
         known = first.setdefault(carrier.topic, (at, carrier))
         if known[1].kind != carrier.kind:
             message = f"{carrier.topic} is {carrier.kind} at {at}, and {known[1].kind} at {known[0]}"
-            hint = (
-                did_you_mean(carrier.kind, [known[1].kind]) or "correct one, or remap one end under `ros: {nodes: …}`"
-            )
-            yield Diagnostic(
-                "ROS111", message, carrier.span, hint=hint, notes=((f"{known[0]} is here", known[1].span),)
-            )
+            near = did_you_mean(carrier.kind, [known[1].kind])
+            hint = near or "correct one, or remap one end under `ros: {nodes: …}`"
+            notes = ((f"{known[0]} is here", known[1].span),)
+            yield Diagnostic("ROS111", message, carrier.span, hint=hint, notes=notes)
 
 
 def unknown_types(plan: Plan, contract: Contract) -> Iterator[Diagnostic]:
@@ -105,28 +103,40 @@ def unknown_types(plan: Plan, contract: Contract) -> Iterator[Diagnostic]:
     yield from wrong
     packages = {name.partition("/")[0] for name in known.messages}
     missing: set[str] = set()
-    for topic in (topic for node in contract.nodes for topic in node.topics):
-        kind = canonical(topic.ros_type)
+    asked = [(canonical(topic.ros_type), topic.span, topic.name) for node in contract.nodes for topic in node.topics]
+    for kind, span, name in () if wrong else (*asked, *_parts_of(known, {kind for kind, _, _ in asked})):
         if kind in known.messages:
             continue
         parts = [part for part in (f"{kind}_{end}" for end in CALL_PARTS) if part in known.messages]
         if parts:
-            message = f"{kind} is a service or an action: which part of a call {topic.name} carries is not said"
-            yield Diagnostic("ROS104", message, topic.span, Severity.WARNING, f"write {' or '.join(parts)}")
+            message = f"{kind} is a service or an action: which part of a call {name} carries is not said"
+            yield Diagnostic("ROS104", message, span, Severity.WARNING, f"write {' or '.join(parts)}")
             continue
-        package = kind.partition("/")[0]
-        if package in packages:
-            own = (name.partition("/")[2] for name in known.messages if name.startswith(f"{package}/"))
-            near = [f"`{package}/{name}`" for name in nearest(kind.partition("/")[2], own)]
-            text = f"nothing defines {kind}"
-        else:
-            near = [f"the package `{name}`" for name in nearest(package, packages, alike=0.75)]
+        package, _, word = kind.partition("/")
+        own = sorted(other.partition("/")[2] for other in known.messages if other.startswith(f"{package}/"))
+        near = [f"{package}/{other}" for other in nearest(word, own)]
+        near += (other for other in sorted(known.messages) if other.endswith(f"/{word}"))
+        text = f"nothing defines {kind}"
+        if package not in packages:
+            near[:0] = (f"{other}/{word}" for other in nearest(package, packages, alike=0.75))
             text = f"neither `messages` nor the distribution has the package {package}, of {kind}"
         if package in packages or (plan.messages and package not in missing):  # one warning for a missing package
-            meant = "".join(f"did you mean {name}? If not, " for name in near)
-            hint = f"{meant}add its definition (`{package}/msg/….msg`) under `messages`"
-            yield Diagnostic("ROS104", text, topic.span, Severity.WARNING, hint)
+            meant = f"did you mean `{near[0]}`?" if near else suggest(word, own) or ""
+            hint = f"{meant} If not, add its definition (`{package}/msg/….msg`) under `messages`".removeprefix(
+                " If not, "
+            )
+            yield Diagnostic("ROS104", text, span, Severity.WARNING, hint)
         missing |= {package} - packages
+
+
+def _parts_of(known: Definitions, kinds: Collection[str]) -> Iterator[tuple[str, Span, str]]:
+    """The types of the fields of some types that the plan's files define, at their lines; and the fields' names."""
+    named = [known.messages[kind] for kind in kinds if kind in known.messages]
+    names = {message.name for message in named} | {name for message in named for name in known.within(message)}
+    for message in (known.messages[name] for name in sorted(names & known.messages.keys())):
+        for each in message.fields if message.source.endswith(".msg") else ():
+            if isinstance(wire := each.wire.item if isinstance(each.wire, Array) else each.wire, Nested):
+                yield wire.name, Span(message.source, each.line, 1, each.line, 2), each.name
 
 
 def turned(plan: Plan, contract: Contract) -> Iterator[Diagnostic]:

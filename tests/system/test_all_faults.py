@@ -161,23 +161,33 @@ def test_a_plan_that_is_no_yaml_keeps_no_fault_of_the_contract_back(tmp_path: Pa
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("text", "said", "line"),
     [
-        ("system: a\n\tb: c\n", "a tab stands where YAML wants spaces"),
-        ("system: a: b\n", "a `:` stands where no key can be"),
-        ("system: @home\n", "no plain text can begin with `@`"),
-        ("system: [a, b\n", "the closing `]` is missing"),
-        ('system: "home\n', "a quotation mark or a bracket is not closed"),
-        ("system: home\n nodes: {}\n", "a `:` stands where no key can be"),
+        ("system: a\n\tb: c\n", "a tab stands where YAML wants spaces", 2),
+        ("system: a: b\n", "a `:` stands where no key can be", 1),
+        ("system: @home\n", "no plain text can begin with `@`", 1),
+        ("system: [a, b\n", "the closing `]` is missing", 1),
+        ("system: [a\nnodes: {}\n", "the closing `]` is missing", 1),
+        ("nodes:\n  a\n  b: {}\n", "a `:` stands where no key can be", 3),
+        ("nodes:\n  a:\n    b\n    c: {}\n  d: {}\n", "a `:` stands where no key can be", 4),
+        ("system: a\nnodes\nros: {}\n", "a key without its `:`", 2),
+        ("nodes:\n  a:\n    - b: {}\n     c: {}\n", "this line is indented as none above it", 4),
+        ("nodes:\n     - a: {}\n    - b: {}\n", "this line is indented as none above it", 3),
+        ('system: "home\n', "a quotation mark or a bracket is not closed", 1),
+        ("system: home\n nodes: {}\n", "a `:` stands where no key can be", 2),
     ],
 )
-def test_what_is_no_yaml_is_told_in_words(text: str, said: str, tmp_path: Path) -> None:
+def test_what_is_no_yaml_is_told_in_words(text: str, said: str, line: int, tmp_path: Path) -> None:
+    """Where it is: what is not ended, at its beginning; and where two lines disagree, the second names the first."""
     (tmp_path / "plan.yaml").write_text(text)
     with pytest.raises(Rejected) as found:
         load_system(tmp_path)
     (fault, *_) = found.value.diagnostics
     assert (fault.code, said in fault.message) == ("PLAN101", True), fault.message
     assert not re.search(r"token|scalar|flow|block|stream", fault.message)
+    assert fault.span is not None
+    assert fault.span.line == line
+    assert "indent" not in fault.message or "this line, or those above" in (fault.hint or "")
 
 
 WIRED = """
@@ -237,7 +247,29 @@ def test_types_that_nothing_defines(tmp_path: Path, kind: str, message: str) -> 
     )  # a missing package is one warning, and a missing type one for each topic
     assert [message in d.message for d in found] == ([True] * twice if message else [])
     assert all("under `messages`" in str(d.hint) for d in found if "part of a call" not in message)
-    assert all(("did you mean" in str(d.hint)) == (kind == "my/Speed") for d in found)
+    meant = {"my/Speed": "did you mean `my/Sped`?", "my/Gear": "known: Sped", "mine/Sped": "did you mean `my/Sped`?"}
+    assert all(meant.get(kind, "") in str(d.hint) for d in found)
+
+
+def test_a_wrong_type_within_a_message_is_told_at_its_line(tmp_path: Path) -> None:
+    """A word that is no type of ROS is an error, without followers; a type that nothing defines is a warning."""
+    from avow.pipeline.plan_check import of_plan
+
+    file = tmp_path / "my" / "Speed.msg"
+    file.parent.mkdir()
+    text = "node a { inputs( ) outputs( x : REAL ) topics( my/Speed t matches(out.x) ) guarantee g (TRUE) }"
+    (tmp_path / "system.rcl").write_text(text, encoding="utf-8")
+    (tmp_path / "plan.yaml").write_text("messages: [my]", encoding="utf-8")
+    for line, code, hint in (
+        ("float46 v", "ROS101", "did you mean `float64`?"),
+        ("std_msgs/Boul v", "ROS104", "did you mean `std_msgs/Bool`?"),
+        ("Twist[] v", "ROS104", "under `messages`"),
+    ):
+        file.write_text(f"# a speed\n{line}\n", encoding="utf-8")
+        (found,) = of_plan(load_system(tmp_path))
+        assert (found.code, found.is_error, hint in (found.hint or "")) == (code, code == "ROS101", True), found
+        assert found.span is not None
+        assert (found.span.file, found.span.line) == (str(file), 2)
 
 
 def test_a_folder_of_messages_with_a_slip_in_its_name_is_told(tmp_path: Path) -> None:
@@ -249,4 +281,4 @@ def test_a_folder_of_messages_with_a_slip_in_its_name_is_told(tmp_path: Path) ->
     (tmp_path / "system.rcl").write_text(text, encoding="utf-8")
     (tmp_path / "plan.yaml").write_text("messages: [msg]\nros: {distro: humble}", encoding="utf-8")
     (found,) = (d for d in of_plan(load_system(tmp_path)) if d.code == "ROS104")
-    assert "did you mean the package `rover_msg`?" in str(found.hint)
+    assert "did you mean `rover_msg/Zone`?" in str(found.hint)
