@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Iterable, Sequence
+from functools import cache
 
 from avow.base.graphs import strong_components
 from avow.base.records import dataclass
@@ -55,51 +56,33 @@ def accepted_run(
     product; an exception from it ends the search.
     """
     width = len(automaton.positive)
-    matching: dict[int, tuple[int, ...]] = {}
 
+    @cache
     def nodes(label: int) -> tuple[int, ...]:
-        found = matching.get(label)
-        if found is None:
-            pairs = zip(automaton.positive, automaton.negative, strict=True)
-            found = tuple(n for n, (yes, no) in enumerate(pairs) if label & yes == yes and not label & no)
-            matching[label] = found
-        return found
+        pairs = zip(automaton.positive, automaton.negative, strict=True)
+        return tuple(n for n, (yes, no) in enumerate(pairs) if label & yes == yes and not label & no)
 
-    allowed: dict[tuple[int, int], tuple[int, ...]] = {}
+    @cache
+    def ways(node: int, label: int) -> tuple[int, ...]:
+        fitting = set(nodes(label))
+        return tuple(n for n in automaton.successors[node] if n in fitting)
 
+    @cache
     def successors(product: int) -> list[int]:
         if tick is not None:
             tick()
         state, node = divmod(product, width)
-        result = []
-        for target in following(state):
-            at_target = label_of(target)
-            key = (node, at_target)
-            ways = allowed.get(key)
-            if ways is None:
-                fitting = set(nodes(at_target))
-                ways = allowed[key] = tuple(n for n in automaton.successors[node] if n in fitting)
-            base = target * width
-            for way in ways:
-                result.append(base + way)
-        return result
+        return [target * width + way for target in following(state) for way in ways(node, label_of(target))]
 
     roots = [state * width + node for state in initial for node in automaton.initial if node in nodes(label_of(state))]
-    cache: dict[int, list[int]] = {}
-
-    def cached(product: int) -> list[int]:
-        found = cache.get(product)
-        if found is None:
-            found = cache[product] = successors(product)
-        return found
 
     def label(product: int) -> int:
         return label_of(product // width)
 
-    for component in strong_components(roots, cached):
-        core = _fair_core(component, cached, label, fair, automaton, width)
+    for component in strong_components(roots, successors):
+        core = _fair_core(component, successors, label, fair, automaton, width)
         if core is not None:
-            return _lasso(roots, core, cached, label, fair, automaton, width)
+            return _lasso(roots, core, successors, label, fair, automaton, width)
     return None
 
 

@@ -41,7 +41,7 @@ class RosMonitoringBackend(Backend):
 
     name = "rosmonitoring"
     title = "runtime monitors, and recorded traces judged by them"
-    version = "13"
+    version = "14"
     strength = Verdict.MONITORED
     link = Link.MAPPED
     of = Object.RECORDING

@@ -64,6 +64,13 @@ def test_silence_breaks_a_response_at_its_deadline(make_system: Make) -> None:
     assert told(make_system, WITHIN, *events, at(3, b=True)) == [(Fault.GUARANTEE, "g", "2")]
 
 
+def test_a_response_right_after_its_limit_is_late(make_system: Make) -> None:
+    heard = "guarantee g ( in.a -> within[0 s](out.b or not arrived(in.a)) )"
+    events = [at(0, a=False), at(0.1, b=False), at(1, a=True), {**OTHER, "time": 9}]
+    assert told(make_system, heard, *events) == [(Fault.GUARANTEE, "g", "1")]
+    assert told(make_system, heard, *events[:3], at(1, b=True), events[3]) == []
+
+
 def test_the_time_before_which_nobody_need_look(make_system: Make) -> None:
     """It is never after the deadline itself, which is a float seldom, and the first of all clauses' deadlines."""
     short = "guarantee h ( rose(in.a) -> within[50 ms](out.b) )"

@@ -202,6 +202,8 @@ class Timed(Records):
         match term.operator:
             case t.Past.STEPS:
                 return self._pace(term)
+            case t.Past.WITHIN if limited and len(term.arguments) == 2:
+                return self._just_missed(term)
             case operator if limited or (operator in _EVER and term.limit is None):
                 return self._aged(term)
             case operator if operator in t.RESPONSES:
@@ -229,6 +231,17 @@ class Timed(Records):
         if term.operator is t.Past.HELD:
             return self._machine(term, Kind.EARLIEST, parts[0], parts[0])
         return self._machine(term, _kind(term), parts[0] if len(parts) == 2 else None, parts[-1])
+
+    def _just_missed(self, term: t.History) -> Lasting:
+        """Whether a limit has just ended: a timer since a beginning at an instant, through that of the limit."""
+        assert term.limit is not None
+        holds, began = map(self.over, term.arguments)
+        through = replace(holds, silent=lambda i: t.TRUE if i.side is Side.AFTER else holds.silent(i), last=None)
+        points = replace(began, silent=lambda i: began.silent(i) if i.side is Side.AT else t.FALSE, last=None)
+        ended = replace(term, limit=replace(term.limit, relation="=="))
+        timer = self._machine(ended, Kind.EARLIEST, through, replace(points, trend=Trend.CHANGES))
+        after = lambda i: timer.silent(i) if i.side is Side.AFTER else t.FALSE  # noqa: E731
+        return replace(timer, now=t.FALSE, silent=after, trend=Trend.CHANGES)
 
     def _negated(self, part: Lasting) -> Lasting:
         if part.last is not None:
@@ -266,7 +279,8 @@ class Timed(Records):
         began, holds = record.began.now, t.TRUE if record.holds is None else record.holds.now
         parts = [part for part in (record.holds, record.began) if part is not None]
         silent = [p.last for p in parts if p.last is not None and p.last != p.now]  # an event, and a formula like one
-        name = f"{record.kind}{CELL}{digest(t.History(t.Past.SINCE, (holds, began, *silent), BOOL))[:12]}"
+        kind = "begun at an instant" if record.relation == "==" else record.kind
+        name = f"{kind}{CELL}{digest(t.History(t.Past.SINCE, (holds, began, *silent), BOOL))[:12]}"
         if name not in self._machines:
             ever = record.kind is Kind.EVER
             before, parameters = at_the_parameters(name, (holds, began), BOOL if ever else REAL)

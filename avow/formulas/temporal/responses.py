@@ -9,11 +9,13 @@ from avow.formulas.formula import conjunction, disjunction, negation
 from avow.formulas.temporal.cell import Unsaid
 from avow.language import terms as t
 from avow.language.sorts import BOOL
+from avow.language.subterms import histories
 
 
 def in_the_past(formula: t.Term) -> t.Term:
-    """The clause without responses: its demands on later steps, expressed over earlier ones. Raises Unsaid if it
-    demands that something happens eventually, which no finite prefix of a run can violate."""
+    """The clause without responses: its demands on later steps, expressed over earlier ones. `F within[d s] G` with two
+    arguments is the instant right after d s with F, the first of them with G. Raises Unsaid if it demands that
+    something happens eventually, which no finite prefix of a run can violate."""
     match formula:
         case t.Quantified(quantifier=t.Quantifier.FORALL):
             return formula.rebuild((in_the_past(formula.body),))
@@ -40,17 +42,30 @@ def _demanded(trigger: t.Term, response: t.History) -> t.Term:
             return t.Implies(t.History(t.Past.PREVIOUS, (trigger, t.FALSE), BOOL, None, span), wanted, span)
         case t.Past.WITHIN:
             assert limit is not None
-            late = t.Limit(">=" if limit.steps else ">", limit.amount, limit.steps)
-            unmet = negation(wanted)
-            return negation(t.History(t.Past.SINCE, (unmet, conjunction((trigger, unmet))), BOOL, late, span))
+            missed = _going_on(negation(wanted), trigger, replace(limit, relation=">=" if limit.steps else ">"))
+            by_an_instant = replace(missed, operator=t.Past.WITHIN, limit=limit)
+            exact = limit.steps or _begins_at_an_instant(wanted)
+            return negation(missed if exact else disjunction((missed, by_an_instant)))
         case t.Past.FOR:
             return t.Implies(t.History(t.Past.ONCE, (trigger,), BOOL, limit, span), wanted, span)
         case t.Past.UNTIL:
-            ended = response.arguments[1]
-            waiting = conjunction((trigger, negation(ended)))
-            return t.Implies(t.History(t.Past.SINCE, (negation(ended), waiting), BOOL, None, span), wanted, span)
+            return t.Implies(_going_on(negation(response.arguments[1]), trigger), wanted, span)
         case _:
             raise Unsaid(f"`{response.operator}`, which no first steps of a run can break", span)
+
+
+def _going_on(holds: t.Term, trigger: t.Term, limit: t.Limit | None = None) -> t.History:
+    return t.History(t.Past.SINCE, (holds, conjunction((trigger, holds))), BOOL, limit)
+
+
+def _begins_at_an_instant(formula: t.Term) -> bool:
+    """Whether a formula is never false at an instant and true right after it, as `not arrived(in.p)` is."""
+    at_steps = (t.Past.ARRIVED, t.Past.ROSE, t.Past.FELL, t.Past.CHANGED, t.Past.PREVIOUS)
+    match formula:
+        case t.And() | t.Or() | t.History(operator=t.Past.ONCE | t.Past.HELD):
+            return all(map(_begins_at_an_instant, formula.children))
+        case _:  # changes at steps alone, or in ways of which none is known
+            return not histories(formula) or (isinstance(formula, t.History) and formula.operator in at_steps)
 
 
 def pending(formula: t.Term) -> t.Term | None:
@@ -63,17 +78,19 @@ def pending(formula: t.Term) -> t.Term | None:
 
 
 def _waits(trigger: t.Term, response: t.History) -> t.Term | None:
+    limit = response.limit
     match response.operator:
         case t.Past.NEXT:
             return trigger
-        case t.Past.WITHIN | t.Past.FOR:
-            assert response.limit is not None
-            early = replace(response.limit, relation="<")
-            unmet = negation(response.arguments[0]) if response.operator is t.Past.WITHIN else t.TRUE
-            return t.History(t.Past.SINCE, (unmet, conjunction((trigger, unmet))), BOOL, early, response.span)
+        case t.Past.WITHIN:
+            assert limit is not None
+            early = replace(limit, relation="<" if limit.steps else "<=")
+            return _going_on(negation(response.arguments[0]), trigger, early)
+        case t.Past.FOR:
+            assert limit is not None
+            return _going_on(t.TRUE, trigger, replace(limit, relation="<"))
         case t.Past.UNTIL:
-            going = negation(response.arguments[1])
-            return t.History(t.Past.SINCE, (going, conjunction((trigger, going))), BOOL, None, response.span)
+            return _going_on(negation(response.arguments[1]), trigger)
         case _:  # eventually
             return None
 
@@ -125,9 +142,8 @@ def fulfilled(formula: t.Term) -> t.Term | None:
     if found is None or found[2].operator is not t.Past.WITHIN:
         return None
     trigger, wanted = conjunction(found[1]), found[2].arguments[0]
-    unmet = negation(wanted)
-    waiting = t.History(t.Past.SINCE, (unmet, conjunction((trigger, unmet))), BOOL)
-    met = conjunction((wanted, disjunction((trigger, t.History(t.Past.PREVIOUS, (waiting, t.FALSE), BOOL)))))
+    waiting = t.History(t.Past.PREVIOUS, (_going_on(negation(wanted), trigger), t.FALSE), BOOL)
+    met = conjunction((wanted, disjunction((trigger, waiting))))
     return _somewhere(found[0], met)
 
 
