@@ -11,9 +11,10 @@ from pathlib import Path
 
 import pytest
 from assurance.sample import case as make_case
-from assurance.sample import evidence, guarantee, system
+from assurance.sample import evidence, guarantee, keys_of, node_plan, system
 from assurance.test_rates import sampled, three
 
+from avow.assurance.deficits import _WORDS, words_of
 from avow.assurance.model import Case
 from avow.base.verdict import Counterexample, Verdict
 from avow.evidence.ledger import Ledger
@@ -21,8 +22,9 @@ from avow.kernel.rates import tail
 from avow.pipeline.report_check import check
 from avow.recount import NUMBER, recounted
 from avow.recount.__main__ import main
-from avow.recount.facts import upper
+from avow.recount.facts import Facts, upper
 from avow.recount.page import blocks
+from avow.recount.rules import _DEFICITS
 from avow.report import formats, render_all
 from avow.system.plan import Finding
 from report.test_answers_page import CASES as PAGES
@@ -41,7 +43,21 @@ def examined() -> Case:
     return make_case(subject, [target], [evidence(target, Verdict.REFUTED, counterexample=Counterexample(values))])
 
 
-CASES: dict[str, Callable[[], Case]] = {"rate": with_a_rate, "examined": examined, **PAGES}  # type: ignore[dict-item]
+def weakened() -> Case:
+    """Inputs without an answer, a claim that NaN breaks, and a refutation by a method that left the plan."""
+    target = guarantee("n", "g")
+    known = {"bound": {"cases": 9, "unanswered": 2}, "details": {"no numbers": "in.x = NaN"}}
+    records = [evidence(target, Verdict.TESTED, "hypothesis", **known), evidence(target, Verdict.REFUTED, "dafny")]
+    subject = system({"n": ["g"]}, plans=[node_plan("n", "low", "hypothesis")])
+    return make_case(subject, [target], records, keys=keys_of(records[:1]))
+
+
+CASES: dict[str, Callable[[], Case]] = {
+    "rate": with_a_rate,
+    "examined": examined,
+    "weakened": weakened,
+    **PAGES,
+}  # type: ignore[dict-item]
 
 
 @cache
@@ -69,6 +85,14 @@ def changed(page: str) -> Iterator[tuple[str, str]]:
 @pytest.mark.parametrize("name", CASES)
 def test_a_true_page_is_borne_out(name: str) -> None:
     assert recounted(*made(name)) == []
+
+
+def test_each_kind_of_deficit_is_recounted() -> None:
+    facts = Facts(json.loads(made("weakened")[1]))
+    assert {"unanswered", "nan", "withdrawn"} <= {d["key"] for d in facts.case["deficits"]}
+    for key in _WORDS:
+        assert facts.deficit(key) is not None, key
+        assert all(any(re.fullmatch(p, words_of(key, n)) for p in _DEFICITS) for n in (1, 2)), key
 
 
 @pytest.mark.slow
