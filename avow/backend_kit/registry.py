@@ -10,8 +10,7 @@ from importlib.metadata import EntryPoint, entry_points
 
 from avow.backend_kit.protocol import Backend, lacks
 from avow.base import process
-from avow.base.codes import Code
-from avow.base.codes_workspace import CORE_CODES
+from avow.base.codes import Code, core_codes
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.suggestions import suggest
 
@@ -63,7 +62,7 @@ def backend(name: str, plugins: tuple[str, ...] = ()) -> Backend:
 @functools.cache
 def every_code() -> Mapping[str, Code]:
     """The diagnostic codes of the core and of every installed backend that loads."""
-    found = dict(CORE_CODES)
+    found = dict(core_codes())
     for name in names():
         with contextlib.suppress(Rejected):
             found |= backend(name).codes

@@ -14,8 +14,7 @@ from pathlib import Path, PurePath
 from typing import Any
 from urllib.parse import quote
 
-from avow.base.codes import Code
-from avow.base.codes_workspace import CORE_CODES
+from avow.base.codes import Code, core_codes
 from avow.base.diagnostics import Diagnostic, Severity, Span
 from avow.base.plain import count
 from avow.base.records import dataclass
@@ -171,11 +170,11 @@ def _shown(d: Diagnostic) -> ShownDiagnostic:
 
 
 def to_sarif(
-    diagnostics: Sequence[Diagnostic], *, version: str = "", codes: Mapping[str, Code] = CORE_CODES
+    diagnostics: Sequence[Diagnostic], *, version: str = "", codes: Mapping[str, Code] | None = None
 ) -> dict[str, Any]:
-    """A SARIF 2.1.0 log with one run; `codes` describe its rules. Paths are kept as given: relative ones are relative
-    to the working folder."""
-    used = sorted({d.code for d in diagnostics})
+    """A SARIF 2.1.0 log with one run; `codes` (by default the core's) describe its rules. Paths are kept as given:
+    relative ones are relative to the working folder."""
+    used, codes = sorted({d.code for d in diagnostics}), core_codes() if codes is None else codes
     rules = []
     for code in used:
         rule: dict[str, Any] = {"id": code}

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import click
 
 from avow.base.codec import document
-from avow.base.codes import CODES
+from avow.base.codes import LANGUAGE, core_codes, is_lint, sections
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.plain import count
 from avow.base.rendering import render, summary, to_sarif, told
@@ -86,10 +86,8 @@ def _explain(found: list[Diagnostic]) -> None:
 
 def _codes(found: list[Diagnostic]) -> Mapping[str, Code]:
     """The known codes; those of backends only if one occurs."""
-    from avow.base.codes_workspace import CORE_CODES
-
-    if all(d.code in CORE_CODES for d in found):
-        return CORE_CODES
+    if all(d.code in core_codes() for d in found):
+        return core_codes()
     from avow.backend_kit.registry import every_code
 
     return every_code()
@@ -131,7 +129,7 @@ def _system(folder: Path, found: list[Diagnostic]) -> tuple[list[Path], frozense
             plan, _, faults, _ = read_rest(plan_file)
         except Rejected as rejected:
             found.extend(rejected.diagnostics)
-            lints = frozenset(code for code, one in CODES.items() if one.is_lint)  # which of them are off is unknown
+            lints = frozenset(filter(is_lint, sections()[LANGUAGE]))  # which of them are off is unknown
             return sorted(folder.glob("*.rcl")), lints
         found.extend(faults)
         given = Path.cwd() / folder

@@ -11,7 +11,7 @@ import re
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from itertools import permutations
 
-from avow.base.codes import CODES
+from avow.base.codes import is_lint
 from avow.base.diagnostics import Diagnostic, Severity, Span
 from avow.base.records import dataclass
 from avow.base.suggestions import distance
@@ -135,7 +135,7 @@ def _no_lints(file: LintedFile) -> Iterator[Diagnostic]:
     for comment in file.comments:
         match = _ALLOW.search(comment.text)
         for code in sorted(set(_CODE.findall(match.group(1)))) if match is not None else ():
-            if code not in CODES or not CODES[code].is_lint:
+            if not is_lint(code):
                 span = file.reports.source.span(comment.start, comment.end)
                 yield _warning("RCL410", f"`{code}` is not the code of a lint", span)
 

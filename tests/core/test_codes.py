@@ -12,10 +12,9 @@ import pytest
 from helpers import nodes, parsed
 
 from avow.backend_kit.registry import backend, names
-from avow.base.codes import CODES, Code, declare, register
-from avow.base.codes_plan import PLAN_CODES
-from avow.base.codes_ros import ROS_CODES
-from avow.base.codes_workspace import CORE_CODES, WORKSPACE_CODES, page_entry
+from avow.base.codes import LANGUAGE, Code, core_codes, declare, register, sections
+from avow.base.diagnostics import Severity
+from avow.system.strict_yaml import read_yaml
 
 ROOT = Path(__file__).parents[2]
 PAGE = ROOT / "docs" / "diagnostics.md"
@@ -77,7 +76,7 @@ def backends() -> dict[str, dict[str, Code]]:
 
 
 def declared() -> dict[str, Code]:
-    return register(*CORE_CODES.values(), *(code for codes in backends().values() for code in codes.values()))
+    return register(*core_codes().values(), *(code for codes in backends().values() for code in codes.values()))
 
 
 @pytest.fixture(scope="module")
@@ -109,7 +108,9 @@ def test_no_code_is_declared_twice() -> None:
     code = declare("A001", "a", "a", "a")
     with pytest.raises(ValueError, match="A001 is declared twice"):
         register(code, code)
-    assert len(declared()) == len(CORE_CODES) + sum(map(len, backends().values()))
+    assert len(declared()) == len(core_codes()) + sum(map(len, backends().values()))
+    path = ROOT / "avow" / "base" / "codes.yaml"
+    assert [d for d in read_yaml(path.read_bytes(), path.name)[1] if "U+0000" not in d.message] == []
 
 
 def test_backends_declare_their_own(where: dict[str, set[str]]) -> None:
@@ -119,7 +120,7 @@ def test_backends_declare_their_own(where: dict[str, set[str]]) -> None:
         for code in codes:
             assert f"backends/{name}" in where[code]
             assert where[code] <= {f"backends/{name}", "avow/cli"}, code
-    for code in CORE_CODES:
+    for code in core_codes():
         assert not any(place.startswith("backends/") for place in where[code]), code
 
 
@@ -136,19 +137,19 @@ def test_every_code_says_what_it_means() -> None:
         assert FORM.fullmatch(code.code)
         assert code.title
         assert code.explanation.endswith((".", "`)", ".)")), code.code
-        assert code.remedy.endswith((".", "`")) or code.code in CODES, code.code
+        assert code.remedy.endswith((".", "`")) or code.code in sections()[LANGUAGE], code.code
+
+
+def page_entry(code: Code) -> str:
+    """A code in `docs/diagnostics.md`."""
+    mark = "" if code.severity is Severity.ERROR else f" ({code.severity})"
+    return f"**{code.code}{mark}, {code.title}.** {code.explanation} {code.remedy}".strip()
 
 
 def test_the_page_is_in_step() -> None:
-    sections = {
-        "The language": CODES,
-        "Plans and systems": PLAN_CODES,
-        "ROS": ROS_CODES,
-        "Backends, policies, requirements, ledgers, commands": WORKSPACE_CODES,
-        **{f"The backend {name}": codes for name, codes in backends().items()},
-    }
+    own = {f"The backend {name}": codes for name, codes in backends().items()}
     page = INTRO
-    for title, codes in sections.items():
+    for title, codes in {**sections(), **own}.items():
         page += f"\n## {title}\n\n" + "\n\n".join(map(page_entry, codes.values())) + "\n"
     if os.environ.get("AVOW_REFRESH"):
         PAGE.write_text(page, "utf-8")

@@ -45,6 +45,8 @@ ELSEWHERE = {
     "avow/backend_kit/protocol._required": KEPT,
     "avow/backend_kit/registry.every_code": ONCE,
     "avow/backend_kit/registry.installed": ONCE,
+    "avow/base/codes.core_codes": ONCE,
+    "avow/base/codes.sections": ONCE,
     "avow/base/files._known": ONCE,
     "avow/base/process.here": PROCESS,
     "avow/base/tools.libraries": ONCE,

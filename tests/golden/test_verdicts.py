@@ -24,7 +24,7 @@ from calculus.test_random_systems import random_system as random_flags
 from logic.test_oracle import small_node
 from temporal.test_viability import drawn, node_of
 
-from avow.base.codes import CODES
+from avow.base.codes import LANGUAGE, sections
 from avow.calculus.composition import compose
 from avow.language.contract import Node
 from avow.language.load import check_text
@@ -111,7 +111,7 @@ def sanity(node: Node) -> str:
 
 def test_diagnostics() -> None:
     """Which diagnostics each diagnostic's example brings about, and where."""
-    same("diagnostics", (f"{code.code}: {told(code.text)}" for code in CODES.values() if code.example))
+    same("diagnostics", (f"{code.code}: {told(code.text)}" for code in sections()[LANGUAGE].values() if code.example))
 
 
 def told(text: str) -> str:

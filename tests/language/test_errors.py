@@ -6,7 +6,7 @@ import re
 
 import pytest
 
-from avow.base.codes import CODES
+from avow.base.codes import LANGUAGE, sections
 from avow.language.load import check_text
 
 FRAME = """\
@@ -26,22 +26,28 @@ def errors(text: str) -> list[str]:
     return [f"{d.code} {d.message} [{d.hint}]" for d in found if d.is_error]
 
 
-@pytest.mark.parametrize("code", [c for c in CODES.values() if c.example], ids=lambda c: c.code)
+@pytest.mark.parametrize("code", [c for c in sections()[LANGUAGE].values() if c.example], ids=lambda c: c.code)
 def test_every_code_has_an_example_that_triggers_it(code) -> None:  # type: ignore[no-untyped-def]
     found = check_text(code.text, "f")[1]
     assert code.code in {d.code for d in found}
-    assert all(d.severity is CODES[d.code].severity for d in found)
+    assert all(d.severity is sections()[LANGUAGE][d.code].severity for d in found)
     assert {d.code for d in found if d.is_error} <= {code.code, *_FOLLOWING.get(code.code, ())}
     for d in found:
         assert d.span is not None
-        assert d.code in CODES
+        assert d.code in sections()[LANGUAGE]
 
 
 _FOLLOWING = {"RCL104": ("RCL113",), "RCL006": ("RCL101", "RCL107", "RCL111", "RCL105")}
 
 
 def test_codes_without_example_are_few() -> None:
-    assert {c.code for c in CODES.values() if not c.example} == {"RCL002", "RCL003", "RCL004", "RCL007", "RCL206"}
+    assert {c.code for c in sections()[LANGUAGE].values() if not c.example} == {
+        "RCL002",
+        "RCL003",
+        "RCL004",
+        "RCL007",
+        "RCL206",
+    }
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from avow.base.codec import to_json
-from avow.base.codes import CODES
+from avow.base.codes import LANGUAGE, sections
 from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.base.rendering import render, to_sarif, told
 from avow.base.tuning.shown import DIAGNOSTICS
@@ -78,7 +78,7 @@ def examine(text: str) -> Contract | None:
     assert len(found) <= DIAGNOSTICS + 1
     lines = text.removeprefix("\ufeff").replace("\r\n", "\n").replace("\r", "\n").split("\n")
     for diagnostic in found:
-        assert diagnostic.code in CODES
+        assert diagnostic.code in sections()[LANGUAGE]
         assert all(_inside(span, lines) for span in _spans(diagnostic)), (diagnostic, len(lines))
     shown = render(found, {"f": text})
     assert not any(c in shown for c in "\x00\x1b\u202e\x7f\x85\u2028")

@@ -13,7 +13,7 @@ import pytest
 from sarif import loader
 
 from avow.base.codec import to_json
-from avow.base.codes import CODES
+from avow.base.codes import LANGUAGE, sections
 from avow.base.diagnostics import Diagnostic, Severity, Span
 from avow.base.rendering import to_sarif, told
 from avow.cli import main
@@ -60,7 +60,7 @@ NAMES = (
 def wide(names: tuple[str, ...] = NAMES) -> list[Diagnostic]:
     """Every code with its greatest severity, and notes, in every file."""
     found = []
-    for i, code in enumerate(CODES.values()):
+    for i, code in enumerate(sections()[LANGUAGE].values()):
         name = names[i % len(names)]
         note = (("see here", Span(name, 1, 2, 1, 3)), ("and mind", None))
         found.append(
