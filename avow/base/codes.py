@@ -1,13 +1,15 @@
-"""The diagnostic codes: their meaning, and a text that triggers each. Those of the core are data, in ``codes.yaml``.
+"""The diagnostic codes: their meaning, and a text that triggers each. They are data, in ``codes.yaml``.
 
-A backend declares the codes of its own in its folder (`codes.py`), with `declare` and `register`, and shows them as an
-attribute `codes`. The tests check every example; docs/diagnostics.md lists all codes.
+A backend declares the codes of its own in its folder, and shows them as an attribute `codes`: a `Catalogue`, or, for a
+backend that is a single file, what `register` returns. The tests check every example; docs/diagnostics.md lists all
+codes.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from functools import cache
+from collections.abc import Iterator, Mapping
+from functools import cache, cached_property
+from typing import Any
 
 from avow.base.diagnostics import Severity
 from avow.base.packaged import packaged
@@ -75,25 +77,44 @@ LANGUAGE = "The language"
 """The section with the codes of contracts."""
 
 
+class Catalogue(Mapping[str, Code]):
+    """The codes that the ``codes.yaml`` of a package declares, read when first needed."""
+
+    def __init__(self, package: str) -> None:
+        self._package = package
+
+    @cached_property
+    def _codes(self) -> Mapping[str, Code]:
+        return _read(packaged(self._package, "codes.yaml"))
+
+    def __getitem__(self, code: str) -> Code:
+        return self._codes[code]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._codes)
+
+    def __len__(self) -> int:
+        return len(self._codes)
+
+
+def _read(codes: Mapping[str, Mapping[str, Any]]) -> dict[str, Code]:
+    return {
+        code: Code(
+            code,
+            said["title"],
+            said["means"],
+            said.get("example", ""),
+            Severity.WARNING if said.get("warning") else Severity.ERROR,
+            said.get("remedy", ""),
+        )
+        for code, said in codes.items()
+    }
+
+
 @cache
 def sections() -> Mapping[str, Mapping[str, Code]]:
     """The codes of the core, by the sections of docs/diagnostics.md."""
-    return {
-        title: register(
-            *(
-                Code(
-                    code,
-                    said["title"],
-                    said["means"],
-                    said.get("example", ""),
-                    Severity.WARNING if said.get("warning") else Severity.ERROR,
-                    said.get("remedy", ""),
-                )
-                for code, said in codes.items()
-            )
-        )
-        for title, codes in packaged("avow.base", "codes.yaml").items()
-    }
+    return {title: _read(codes) for title, codes in packaged("avow.base", "codes.yaml").items()}
 
 
 @cache

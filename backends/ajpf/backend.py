@@ -11,6 +11,7 @@ from pathlib import Path
 
 from avow.backend_kit.given import file_path
 from avow.backend_kit.protocol import Backend, Job, Limits, OutsideCheck, Report, Tool
+from avow.base.codes import Catalogue
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.files import read_text
 from avow.base.verdict import Link, Verdict
@@ -19,7 +20,6 @@ from avow.language.sorts import DataSort, EnumSort, FunctionSort, RealSort, Sort
 from avow.language.subterms import subterms
 from avow.language.terms import Arithmetic, Compare, Negative, Operation, Term
 
-from .codes import CODES
 from .schema import SCHEMA
 
 
@@ -39,7 +39,7 @@ class AjpfBackend(Backend):
     )
     link = Link.MAPPED
     options_schema = SCHEMA
-    codes = CODES
+    codes = Catalogue("avow.backends.ajpf")
     green_means = (
         "Every property that the guarantee became, through the plan's table and for the plan's instances, holds in "
         "every run of the agent program in the stated environment, explored exhaustively. It shows nothing of other "

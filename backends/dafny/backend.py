@@ -14,6 +14,7 @@ from avow.backend_kit.given import existing_file, file, file_path, schema, summa
 from avow.backend_kit.one_step import unsaid
 from avow.backend_kit.protocol import Backend, Job, Limits, OutsideCheck, Report, Tool, Translated
 from avow.base import process
+from avow.base.codes import Catalogue
 from avow.base.diagnostics import Diagnostic, Rejected, Severity, Span
 from avow.base.files import read_regular
 from avow.base.plain import one_line
@@ -21,7 +22,6 @@ from avow.base.verdict import Link, Outcome, Verdict
 from avow.language.contract import Clause, Node
 from avow.system.plan import System
 
-from .codes import CODES
 from .dafny_tool import INSTALL, dafny
 from .tuning import PROGRAM_BYTES
 
@@ -47,7 +47,7 @@ class DafnyBackend(Backend):
     options_schema = schema(
         {"implementation": file("the Dafny file that refines the generated specification")}, "implementation"
     )
-    codes = CODES
+    codes = Catalogue("avow.backends.dafny")
     translations = {"dafny": "Dafny types, predicates, a specification and a skeleton for each node"}
     green_means = (
         "Dafny proved that the implementation's Step meets this guarantee for all inputs that meet the assumptions "

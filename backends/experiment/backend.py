@@ -10,11 +10,11 @@ from avow.backend_kit.given import file_path, summarized
 from avow.backend_kit.one_step import unsaid
 from avow.backend_kit.protocol import Backend, Job, Limits, Report
 from avow.base.codec import document
+from avow.base.codes import Catalogue
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.verdict import Link, Object, Verdict
 from avow.language.contract import Clause, Node
 
-from .codes import CODES
 from .options import SCHEMA, read
 from .verdict import settle
 
@@ -33,7 +33,7 @@ class ExperimentBackend(Backend):
     link = Link.MAPPED
     of = Object.RECORDING
     options_schema = SCHEMA
-    codes = CODES
+    codes = Catalogue("avow.backends.experiment")
     green_means = (
         "The runs in the data that met the guarantee's condition met the guarantee, often enough for the stated "
         "confidence. It shows nothing of other conditions, and that the columns are the ports is a person's word."

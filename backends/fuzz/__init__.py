@@ -7,11 +7,10 @@ from pathlib import Path
 
 from avow.backend_kit.given import NAN, schema, whole_number
 from avow.backend_kit.protocol import Backend, Job, Limits, Report, Tool
+from avow.base.codes import Catalogue
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.verdict import Link, Object, Verdict
 from avow.evidence.obligation import ProgramClaim
-
-from .codes import CODES
 
 _LISTED = {"type": "array", "items": {"type": "string", "minLength": 1}, "uniqueItems": True}
 
@@ -39,7 +38,7 @@ class FuzzBackend(Backend):
             "nan": NAN,
         }
     )
-    codes = CODES
+    codes = Catalogue("avow.backends.fuzz")
     green_means = (
         "libFuzzer made so many runs of the compiled source without a report of a sanitizer; on those of them that are "
         "new, and on others at thresholds, a plain build gave outputs that meet the guarantee, judged exactly. It says "

@@ -8,13 +8,12 @@ from pathlib import Path
 from avow.backend_kit.given import file, schema
 from avow.backend_kit.one_step import unsaid
 from avow.backend_kit.protocol import Backend, Job, Limits, OutsideCheck, Report, Tool
+from avow.base.codes import Catalogue
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.tools import z3_tool
 from avow.base.verdict import Link, Verdict
 from avow.formulas.values import Value
 from avow.language.contract import Clause, Node
-
-from .codes import CODES
 
 _TABLE = {
     "type": "object",
@@ -66,7 +65,7 @@ class Hoare(Backend):
         },
         "program",
     )
-    codes = CODES
+    codes = Catalogue("avow.backends.hoare")
     green_means = (
         "Every run of the program that starts in an input allowed by the assumptions ends in outputs that meet the "
         "guarantee. It is about the program as written in the imperative language, over exact numbers, and says "

@@ -10,12 +10,11 @@ from pathlib import Path
 from avow.backend_kit.given import READING, file, schema, whole_number
 from avow.backend_kit.one_step import unsaid
 from avow.backend_kit.protocol import Backend, Job, Limits, OutsideCheck, Report, Tool
+from avow.base.codes import Catalogue
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.tools import works
 from avow.base.verdict import Link, Verdict
 from avow.language.contract import Clause, Node
-
-from .codes import CODES
 
 _SUBJECT = {**file("file.py:function, or file.py:Class with a method `step`"), "pattern": "^.+:[^:]+$"}
 _CASES = whole_number("how many cases", 1_000_000, 500)
@@ -39,7 +38,7 @@ class HypothesisBackend(Backend):
     uses_source = True
     link = Link.GENERATED
     options_schema = schema({"subject": _SUBJECT, "cases": _CASES, "numbers": _NUMBERS, **READING})
-    codes = CODES
+    codes = Catalogue("avow.backends.hypothesis")
     green_means = (
         "On so many generated inputs that meet the assumptions the function returned outputs that meet the guarantee, "
         "and the guarantee's condition was met in some of them. It says nothing certain of other inputs; the bound on "

@@ -6,12 +6,11 @@ from pathlib import Path
 
 from avow.backend_kit.given import NAN, schema
 from avow.backend_kit.protocol import Backend, Job, Limits, Report, Tool
+from avow.base.codes import Catalogue
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.tools import z3_tool
 from avow.base.verdict import Link, Object, Verdict
 from avow.evidence.obligation import ProgramClaim
-
-from .codes import CODES
 
 
 class PythonBackend(Backend):
@@ -29,7 +28,7 @@ class PythonBackend(Backend):
     needs_source = "python"
     claims = (ProgramClaim.LINKED,)
     options_schema = schema({"nan": NAN})
-    codes = CODES
+    codes = Catalogue("avow.backends.python")
     green_means = (
         "Every call of this file's `step`, from any state that its assumptions allow and on any finite inputs, gives "
         "outputs that meet the guarantee, in the meaning that CPython gives the text; REAL is what the plan's "

@@ -9,6 +9,7 @@ from pathlib import Path
 from avow.backend_kit.given import existing_file, file, schema, summarized
 from avow.backend_kit.protocol import Backend, Job, Limits, Report
 from avow.base.codec import document
+from avow.base.codes import Catalogue
 from avow.base.diagnostics import Diagnostic, Rejected, Severity
 from avow.base.files import inside
 from avow.base.suggestions import suggest
@@ -18,7 +19,6 @@ from avow.evidence.obligation import Obligation
 from avow.evidence.record import SIGNED_BY
 from avow.evidence.signing import signature_path
 
-from .codes import CODES
 from .record import CONCLUSIONS, Judged, Record, current_meaning, read_record, stale_clause, stale_files
 from .signature import signed
 
@@ -48,7 +48,7 @@ class ReviewBackend(Backend):
         type=["object", "string"],
         description="the record's path, or the record's path under the key 'record'",
     )
-    codes = CODES
+    codes = Catalogue("avow.backends.review")
     green_means = (
         "A named person read exactly these files, answered every question of the checklist and accepted this "
         "guarantee in exactly this meaning. It shows what that person saw, no more."

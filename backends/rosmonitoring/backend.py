@@ -12,13 +12,12 @@ from typing import TYPE_CHECKING, Any
 from avow.backend_kit.given import DURATION, READING, schema
 from avow.backend_kit.protocol import Backend, Job, JudgedRun, Limits, OutsideCheck, Report, Translated
 from avow.base.codec import document
+from avow.base.codes import Catalogue
 from avow.base.diagnostics import Diagnostic, Severity
 from avow.base.files import inside, read_text
 from avow.base.tools import Tool, works
 from avow.base.verdict import Link, Object, Verdict
 from avow.ros.sources import message_files
-
-from .codes import CODES
 
 if TYPE_CHECKING:
     from avow.formulas.values import Value
@@ -51,7 +50,7 @@ class RosMonitoringBackend(Backend):
     records = True
     judges_runs = True
     options_schema = SCHEMA
-    codes = CODES
+    codes = Catalogue("avow.backends.rosmonitoring")
     translations = {"rml": "an RML specification for each node, by the plan's mapping"}
     green_means = (
         "On the recorded events the guarantee held at every judgement, by exact evaluation. It shows nothing of other "
