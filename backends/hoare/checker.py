@@ -12,13 +12,14 @@ from avow.formulas.formula import substitute
 from avow.language import sorts as s
 from avow.language.contract import Contract, Node, Port
 from avow.language.printer import show_sort, show_term
+from avow.language.scope import of_contract
+from avow.language.syntax import Application, Name, PortName, TermSyntax
 from avow.language.terms import Apply, Role, Term, TupleTerm, Variable
 
 from . import syntax
-from .names import UNKNOWN, Names, assignments, expect, spread, vocabulary
 from .parser import parse_expression
 from .program import Assign, Block, If, Match, Predicate, Program, Reading, Skip, Statement, Update, While, variable
-from .typing import Scope, fit, formula, rejected, term
+from .typing import Expressions, Local, Names, assignments, expect, fitted, rejected, spread
 
 T = TypeVar("T")
 
@@ -43,11 +44,11 @@ class _Entry:
     port: Port
     parameters: tuple[Variable, ...] | None
     """Of a predicate's pattern; None for a whole port."""
-    meaning: syntax.Expression
+    meaning: syntax.Written
     span: Span
 
 
-def check(source: syntax.Source, contract: Contract, node: Node, table: Table) -> Checked:
+def check(source: syntax.ProgramText, contract: Contract, node: Node, table: Table) -> Checked:
     """Raises Rejected, with everything that is wrong (codes ``HOARE200``, ``HOARE300``, ``HOARE400``)."""
     checker = _Checker(source, contract, node)
     return checker.run(table)
@@ -70,9 +71,9 @@ def _covers(term: Term, sort: s.Sort, used: set[Variable]) -> bool:
 
 
 class _Checker:
-    def __init__(self, source: syntax.Source, contract: Contract, node: Node) -> None:
+    def __init__(self, source: syntax.ProgramText, contract: Contract, node: Node) -> None:
         self.source, self.node = source, node
-        self.names = Names(vocabulary(contract, node))
+        self.names = Names(of_contract(contract))
         self.problems: list[Diagnostic] = []
         self.assigned_names = {statement.target.name for statement, _ in assignments(source.body, self.names)}
         self.given: dict[str, Variable] = {}
@@ -84,8 +85,7 @@ class _Checker:
         entries = self._attempt(lambda: self._entries(table)) or ()
         self._sorts(entries)
         reading = self._reading(entries)
-        scope = Scope(self.names)
-        body = self._block(self.source.body, scope)
+        body = self._block(self.source.body, {})
         if self.problems:
             raise Rejected(*dict.fromkeys(self.problems))
         sorts = self.names.sorts
@@ -103,12 +103,11 @@ class _Checker:
     # -- names ---------------------------------------------------------------------------------------------------------
 
     def _declarations(self) -> None:
-        types = self.names.vocabulary.types
         for declaration in self.source.declarations:
-            unknown = [name for name in (*declaration.parameters, declaration.sort) if name not in types]
-            for word in unknown:
-                self._problem("HOARE200", f"there is no type `{word}`", declaration.span, did_you_mean(word, [*types]))
-            if unknown:
+            words = (*declaration.parameters, declaration.sort)
+            types = {word: found for word in words if (found := self.names.type(word)) is not None}
+            self.problems += [self.names.unknown_type(w, declaration.span) for w in words if w not in types]
+            if types.keys() != set(words):
                 continue
             sort: s.Sort = types[declaration.sort]
             if declaration.parameters:
@@ -131,11 +130,11 @@ class _Checker:
         while known != len(self.names.sorts):  # what one line of the table says helps to read another
             known = len(self.names.sorts)
             for entry in entries:
-                expect(entry.meaning, s.BOOL if entry.parameters is not None else entry.port.sort, self.names)
-            spread(self.source.body, self.names)
-        words = self.names.vocabulary
+                wanted_sort = s.BOOL if entry.parameters is not None else entry.port.sort
+                expect(entry.meaning.tree, wanted_sort, self.names, entry.meaning.text)
+            spread(self.source, self.names)
         for name in sorted(self.names.sorts):
-            if name in words.values or name in words.constructors:
+            if self.names.is_value(name):
                 what = f"`{name}` is a value of the contract; a variable needs another name"
                 self._problem("HOARE200", what, self._first_use(name))
 
@@ -162,15 +161,12 @@ class _Checker:
         return tuple(entries)
 
     def _entry(self, key: str, text: str, span: Span) -> _Entry:
-        pattern = parse_expression(key, span)
-        meaning = parse_expression(text, span)
-        if isinstance(pattern, syntax.Name):
+        pattern, meaning = parse_expression(key, span).tree, parse_expression(text, span)
+        if isinstance(pattern, Name | PortName):
             return _Entry(self._port(pattern, key, span), None, meaning, span)
-        if isinstance(pattern, syntax.Call) and all(
-            isinstance(a, syntax.Name) and a.prefix is None for a in pattern.arguments
-        ):
+        if isinstance(pattern, Application) and all(isinstance(a, Name) for a in pattern.arguments):
             port = self._port(pattern.function, key, span)
-            names = [a.name for a in pattern.arguments if isinstance(a, syntax.Name)]
+            names = [a.text for a in pattern.arguments if isinstance(a, Name)]
             sort = port.sort
             if not isinstance(sort, s.FunctionSort) or sort.result != s.BOOL:
                 raise rejected(
@@ -183,12 +179,10 @@ class _Checker:
             return _Entry(port, parameters, meaning, span)
         raise rejected("HOARE400", f"`{key}` is neither a port (in.r) nor a relation with names (out.done(i))", span)
 
-    def _port(self, name: syntax.Name, key: str, span: Span) -> Port:
-        ports = [
-            port
-            for port in (*self.node.inputs, *self.node.outputs)
-            if port.name == name.name and name.prefix in (None, str(port.role))
-        ]
+    def _port(self, written: TermSyntax, key: str, span: Span) -> Port:
+        assert isinstance(written, Name | PortName)
+        name = written.text if isinstance(written, Name) else f"{written.role}.{written.name}"
+        ports = [p for p in (*self.node.inputs, *self.node.outputs) if name in (p.name, p.variable.qualified)]
         if len(ports) == 1:
             return ports[0]
         if ports:
@@ -196,9 +190,7 @@ class _Checker:
                 "HOARE400", f"`{key}`: there is an input and an output of that name; write in. or out.", span
             )
         known = [f"{p.role}.{p.name}" for p in (*self.node.inputs, *self.node.outputs)]
-        raise rejected(
-            "HOARE400", f"`{key}`: the node has no such input or output", span, did_you_mean(str(name), known)
-        )
+        raise rejected("HOARE400", f"`{key}`: the node has no such input or output", span, did_you_mean(name, known))
 
     # -- what the ports are in the program -----------------------------------------------------------------------------
 
@@ -214,9 +206,9 @@ class _Checker:
             if at not in spans and port.name in self.names.sorts:
                 same = variable(port.name, self.names.sorts[port.name])
                 place = port.span or self.source.span
-                fitted = self._attempt(lambda same=same, port=port, place=place: fit(same, port.sort, place))  # type: ignore[misc]
-                if fitted is not None:
-                    found[at] = Predicate((), fitted)
+                made = self._attempt(lambda same=same, port=port, place=place: fitted(same, port.sort, place))  # type: ignore[misc]
+                if made is not None:
+                    found[at] = Predicate((), made)
         self._givens(found)
         self._outputs(found, spans)
         ghosts: dict[Variable, Term] = dict(self.ghosts)
@@ -231,16 +223,17 @@ class _Checker:
     def _meaning(self, entry: _Entry) -> Predicate:
         """What a line of the table says; of a whole port without parameters."""
         if entry.parameters is None:
-            whole = fit(term(entry.meaning, Scope(self.names)), entry.port.sort, entry.span)
+            whole = Expressions(self.names, entry.meaning.text, {}).read(entry.meaning.tree, entry.port.sort)
             if isinstance(entry.port.sort, s.FunctionSort) and not isinstance(whole, Variable):
                 message = "a function can only be read as a function variable of the program"
                 raise rejected("HOARE400", message, entry.span)
             return Predicate((), whole)
-        taken = [p.name for p in entry.parameters if p.name in self.names.vocabulary.values]
+        taken = [p.name for p in entry.parameters if self.names.is_value(p.name)]
         if taken:
             raise rejected("HOARE400", f"`{taken[0]}` is a value of the contract, no name for an argument", entry.span)
-        local = {p.name: p for p in entry.parameters}
-        return Predicate(entry.parameters, formula(entry.meaning, Scope(self.names, local, quantifiers=True)))
+        local = {p.name: p.sort for p in entry.parameters}
+        expressions = Expressions(self.names, entry.meaning.text, local, asserts=True)
+        return Predicate(entry.parameters, expressions.read(entry.meaning.tree, s.BOOL))
 
     def _givens(self, found: Mapping[_Place, Predicate]) -> None:
         for (role, _), read in found.items():
@@ -274,60 +267,57 @@ class _Checker:
 
     # -- statements ----------------------------------------------------------------------------------------------------
 
-    def _block(self, body: tuple[syntax.Statement, ...], scope: Scope) -> Block:
-        made = (self._attempt(lambda each=each: self._statement(each, scope)) for each in body)  # type: ignore[misc]
+    def _read(self, tree: TermSyntax, local: Local, sort: s.Sort | None = None) -> Term:
+        return Expressions(self.names, self.source.text, local).read(tree, sort)
+
+    def _block(self, body: tuple[syntax.Statement, ...], local: Local) -> Block:
+        made = (self._attempt(lambda each=each: self._statement(each, local)) for each in body)  # type: ignore[misc]
         return tuple(statement for statement in made if statement is not None)
 
-    def _statement(self, statement: syntax.Statement, scope: Scope) -> Statement:
+    def _statement(self, statement: syntax.Statement, local: Local) -> Statement:
         match statement:
             case syntax.Skip(span=span):
                 return Skip(span)
             case syntax.Assign():
-                return self._assign(statement, scope)
+                return self._assign(statement, local)
             case syntax.If(condition=condition, then=then, otherwise=otherwise, span=span):
-                test = self._attempt(lambda: formula(condition, scope))
-                first, second = self._block(then, scope), self._block(otherwise, scope)
+                test = self._attempt(lambda: self._read(condition, local, s.BOOL))
+                first, second = self._block(then, local), self._block(otherwise, local)
                 return Skip(span) if test is None else If(test, first, second, span)
             case syntax.Match():
-                return self._match(statement, scope)
+                return self._match(statement, local)
             case syntax.While(condition=condition, invariant=invariant, variant=variant, body=body, span=span):
-                test = self._attempt(lambda: formula(condition, scope))
-                asserting = Scope(self.names, scope.local, self.ports, True)
-                holds = self._attempt(lambda: formula(invariant, asserting))
-                measure = self._attempt(lambda: self._measure(variant, asserting)) if variant is not None else None
-                inside = self._block(body, scope)
+                test = self._attempt(lambda: self._read(condition, local, s.BOOL))
+                asserting = Expressions(self.names, self.source.text, local, self.ports, asserts=True)
+                holds = self._attempt(lambda: asserting.read(invariant, s.BOOL))
+                measure = self._attempt(lambda: self._measure(variant, local)) if variant is not None else None
+                inside = self._block(body, local)
                 return Skip(span) if test is None or holds is None else While(test, holds, measure, inside, span)
 
-    def _measure(self, variant: syntax.Expression, scope: Scope) -> Term:
-        measure = term(variant, scope)
+    def _measure(self, variant: TermSyntax, local: Local) -> Term:
+        measure = Expressions(self.names, self.source.text, local, self.ports, asserts=True).read(variant)
         if measure.sort not in (s.INTEGER, s.NATURAL):
-            raise rejected("HOARE300", f"a variant is an integer; this is {show_sort(measure.sort)}", variant.span)
+            raise rejected("HOARE300", f"a variant is an integer; this is {show_sort(measure.sort)}", measure.span)
         return measure
 
-    def _assign(self, statement: syntax.Assign, scope: Scope) -> Statement:
+    def _assign(self, statement: syntax.Assign, local: Local) -> Statement:
         name = statement.target
-        words = self.names.vocabulary
-        if name.name in scope.local or name.name in words.values or name.name in words.constructors:
+        if name.name in local or self.names.is_value(name.name):
             raise rejected("HOARE200", f"`{name.name}` is no variable: it cannot be assigned", name.span)
         sort = self.names.sorts.get(name.name)
         if sort is None:
-            value = term(statement.value, scope)  # says what is wrong with it, if something is
+            value = self._read(statement.value, local)  # says what is wrong with it, if something is
             if statement.arguments:
                 known = [n for n, part in self.names.sorts.items() if isinstance(part, s.FunctionSort)]
-                hint = (
-                    did_you_mean(name.name, known)
-                    or f"declare it (VAR {name.name} : A --> B;) or assign a whole map first"
-                )
+                declare = f"declare it (VAR {name.name} : A --> B;) or assign a whole map first"
+                hint = did_you_mean(name.name, known) or declare
                 raise rejected("HOARE200", f"nothing says which map `{name.name}` is", name.span, hint)
             raise rejected("HOARE300", f"the sort of `{name.name}` is unclear ({show_sort(value.sort)}?)", name.span)
-        if UNKNOWN in s.components(sort):
-            wanted = f"declare it: VAR {name.name} : T; with a type T of the contract"
-            raise rejected("HOARE300", f"nothing says of what the sequence `{name.name}` is", name.span, wanted)
         target = variable(name.name, sort)
         if not statement.arguments:
-            value = fit(term(statement.value, scope), sort, statement.value.span)
+            value = self._read(statement.value, local, sort)
             if isinstance(sort, s.FunctionSort) and not isinstance(value, Variable):
-                raise rejected("HOARE300", "only a whole map can be assigned to a map", statement.value.span)
+                raise rejected("HOARE300", "only a whole map can be assigned to a map", value.span)
             return Assign(target, value, statement.span)
         if not isinstance(sort, s.FunctionSort):
             whole = "a sequence is assigned as a whole: s := [a, b]" if isinstance(sort, s.SequenceSort) else None
@@ -335,35 +325,28 @@ class _Checker:
         if len(statement.arguments) != len(sort.parameters):
             message = f"`{name.name}` takes {len(sort.parameters)} argument(s), not {len(statement.arguments)}"
             raise rejected("HOARE300", message, statement.span)
-        arguments = tuple(
-            fit(term(a, scope), p, a.span) for a, p in zip(statement.arguments, sort.parameters, strict=True)
-        )
-        return Update(
-            target, arguments, fit(term(statement.value, scope), sort.result, statement.value.span), statement.span
-        )
+        pairs = zip(statement.arguments, sort.parameters, strict=True)
+        arguments = tuple(self._read(argument, local, parameter) for argument, parameter in pairs)
+        return Update(target, arguments, self._read(statement.value, local, sort.result), statement.span)
 
-    def _match(self, statement: syntax.Match, scope: Scope) -> Statement:
-        subject = term(statement.subject, scope)
-        words = self.names.vocabulary
-        name = statement.constructor
-        if name.name not in words.constructors or words.constructors[name.name][0] != subject.sort:
-            known = [c for c, (data, _) in words.constructors.items() if data == subject.sort]
-            message = f"`{name.name}` does not make values of {show_sort(subject.sort)}"
-            if isinstance(subject.sort, s.EnumSort) or (isinstance(subject.sort, s.DataSort) and not known):
-                hint = f"MATCH takes constructors with arguments apart; for an element, write IF (… == {name.name})"
-                raise rejected("HOARE300", message, name.span, hint)
-            raise rejected("HOARE300", message, name.span, did_you_mean(name.name, known))
-        parameters = words.constructors[name.name][1].parameters
+    def _match(self, statement: syntax.Match, local: Local) -> Statement:
+        subject = self._read(statement.subject, local)
+        name, sort, elements = statement.constructor, subject.sort, self.names.environment.elements
+        if not isinstance(sort, s.DataSort) or elements.get(name.name) != sort:
+            known = [c.name for c in sort.constructors] if isinstance(sort, s.DataSort) else []
+            message = f"`{name.name}` does not make values of {show_sort(sort)}"
+            element = f"MATCH takes constructors with arguments apart; for an element, write IF (… == {name.name})"
+            hint = element if isinstance(sort, s.EnumSort) else did_you_mean(name.name, known)
+            raise rejected("HOARE300", message, name.span, hint)
+        parameters = sort.constructor(name.name).parameters
         if len(parameters) != len(statement.variables):
             message = f"`{name.name}` has {len(parameters)} argument(s), not {len(statement.variables)}"
             raise rejected("HOARE300", message, name.span)
-        local = dict(scope.local)
-        bound: list[Variable] = []
-        for found, sort in zip(statement.variables, parameters, strict=True):
-            if found.name in local or found.name in self.names.sorts or found.name in words.values:
+        inner = dict(local)
+        for found, parameter in zip(statement.variables, parameters, strict=True):
+            if found.name in inner or found.name in self.names.sorts or self.names.is_value(found.name):
                 raise rejected("HOARE200", f"`{found.name}` is in use already", found.span)
-            local[found.name] = variable(found.name, sort)
-            bound.append(local[found.name])
-        then = self._block(statement.then, Scope(self.names, local))
-        otherwise = self._block(statement.otherwise, scope)
-        return Match(subject, name.name, tuple(bound), then, otherwise, statement.span)
+            inner[found.name] = parameter
+        bound = tuple(variable(v.name, inner[v.name]) for v in statement.variables)
+        then, otherwise = self._block(statement.then, inner), self._block(statement.otherwise, local)
+        return Match(subject, name.name, bound, then, otherwise, statement.span)

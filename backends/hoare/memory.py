@@ -17,9 +17,8 @@ from fractions import Fraction
 
 from avow.backend_kit.protocol import Job
 from avow.backend_kit.stepping import Held, Invariant, Stepping, guesses, stepping
-from avow.base.diagnostics import Diagnostic, Rejected, Span
+from avow.base.diagnostics import Rejected, Span
 from avow.base.records import dataclass
-from avow.base.suggestions import did_you_mean
 from avow.evaluation.compiler import member_of
 from avow.evaluation.evaluate import Evaluator, NotEvaluable, compile_term, evaluate
 from avow.evaluation.running import Keeper
@@ -28,25 +27,25 @@ from avow.formulas.temporal.cells import longest_limits, remembers
 from avow.formulas.values import Value, show
 from avow.language.contract import Clause, ClauseKind, Node
 from avow.language.printer import show_sort
+from avow.language.scope import of_contract
 from avow.language.terms import Role, Term, Variable
 
 from .checker import Checked
 from .guesses import Draw, expressions, filled, numbers, strings
 from .interpreter import Endless, Fault, Machine, NoEnd, State
-from .names import Names, vocabulary
-from .syntax import Memory, Source
+from .syntax import Memory, ProgramText
 from .triples import Triple, triples
 from .tuning import DRAWS, GUESSES, LONGEST_RUN, RUN_LENGTH, RUNS, STICKY
-from .typing import Scope, fit, rejected, term
+from .typing import Expressions, Names, rejected
 from .wp import Condition, TooLarge, conditions
 
 
-def steps_of(job: Job, source: Source) -> Stepping | None:
+def steps_of(job: Job, source: ProgramText) -> Stepping | None:
     """The steps of the job's node with this program; None where neither remembers anything. Raises Rejected."""
     stated = _stated(job)
     if not source.memory and not stated and not remembers(job.node):
         return None
-    held = tuple(_held(each, job) for each in source.memory)
+    held = tuple(_held(each, source, job) for each in source.memory)
     return stepping(job.node, (o.name for o in job.obligations), held, stated, job.contract)
 
 
@@ -59,17 +58,12 @@ def _stated(job: Job) -> tuple[tuple[str, Span], ...]:
     return tuple((str(text), place.at("invariants", k)) for k, text in enumerate(texts))
 
 
-def _held(memory: Memory, job: Job) -> Held:
-    names = Names(vocabulary(job.contract, job.node))
-    types = names.vocabulary.types
-    if memory.sort not in types:
-        raise Rejected(
-            Diagnostic(
-                "HOARE200", f"there is no type `{memory.sort}`", memory.span, hint=did_you_mean(memory.sort, [*types])
-            )
-        )
-    sort = types[memory.sort]
-    initial = fit(term(memory.initial, Scope(names)), sort, memory.span)
+def _held(memory: Memory, source: ProgramText, job: Job) -> Held:
+    names = Names(of_contract(job.contract))
+    sort = names.type(memory.sort)
+    if sort is None:
+        raise Rejected(names.unknown_type(memory.sort, memory.span))
+    initial = Expressions(names, source.text, {}).read(memory.initial, sort)
     try:
         value = None if free_variables(initial) else evaluate(initial, {})
     except NotEvaluable:

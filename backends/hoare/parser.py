@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import fields, is_dataclass
-from fractions import Fraction
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -15,29 +14,34 @@ from lark.visitors import Transformer_NonRecursive
 from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.base.grammars import lark_of
 from avow.base.records import dataclass
+from avow.language import lexer
+from avow.language import syntax as rcl
+from avow.language.sorts import BUILTINS
+from avow.language.source import Source
+from avow.language.terms import Quantifier
 
 from . import syntax
 from .tuning import NESTING
 
 
-def parse_program(text: str, file: str) -> syntax.Source:
+def parse_program(text: str, file: str) -> syntax.ProgramText:
     """Raises Rejected with code ``HOARE100``."""
-    source: syntax.Source = _parse(text, file, "program")
+    source: syntax.ProgramText = _parse(text, file, "program")
     return source
 
 
-def parse_expression(text: str, place: Span) -> syntax.Expression:
-    """An expression from the plan, every part of which is reported at `place`. Raises Rejected."""
+def parse_expression(text: str, place: Span) -> syntax.Written:
+    """An expression at a place of the plan. Raises Rejected."""
     try:
-        expression: syntax.Expression = _parse(text, place.file, "expression", place)
+        tree = _parse(text, place.file, "expression")
     except Rejected as rejected:
         raise Rejected(
             *(Diagnostic(d.code, f'in "{text}": {d.message}', place, hint=d.hint) for d in rejected.diagnostics)
         ) from rejected
-    return expression
+    return syntax.Written(tree, Source(place.file, text, place.line, place.column))
 
 
-def _parse(text: str, file: str, start: str, place: Span | None = None) -> Any:
+def _parse(text: str, file: str, start: str) -> Any:
     lark = _lark()
     last: Token | None = None
     try:
@@ -48,7 +52,7 @@ def _parse(text: str, file: str, start: str, place: Span | None = None) -> Any:
         for token in tokens:
             interactive.feed_token(token)
             last = token
-        result = _Build(file, place).transform(interactive.feed_eof(last))
+        result = _Build(Source(file, text)).transform(interactive.feed_eof(last))
     except UnexpectedCharacters as error:
         span = Span(file, error.line, error.column, error.line, error.column + 1)
         hint = "a program has no fields of records: it assigns a record as a whole" if error.char == "." else None
@@ -58,7 +62,7 @@ def _parse(text: str, file: str, start: str, place: Span | None = None) -> Any:
         raise Rejected(_explain(error, file, last)) from error
     except VisitError as error:
         raise error.orig_exc from None
-    deep = _too_deep(result)
+    deep = _too_deep(result, Source(file, text))
     if deep is not None:
         raise Rejected(Diagnostic("HOARE100", f"nested more than {NESTING} levels deep", deep))
     return result
@@ -102,40 +106,49 @@ def _lark() -> Any:
     return lark_of(Path(__file__).with_name("imp.lark"), "imp", starts, propagate_positions=True)
 
 
-def _too_deep(root: Any) -> Span | None:
+def _too_deep(root: Any, text: Source) -> Span | None:
     """The place of a node too far below the root, found without recursion."""
     stack: list[tuple[Any, int]] = [(root, 0)]
     while stack:
         node, depth = stack.pop()
         if isinstance(node, tuple):
             stack.extend((item, depth) for item in node)
-        elif is_dataclass(node) and not isinstance(node, Span):
+        elif isinstance(node, rcl.TermSyntax):
+            if depth + node.depth > NESTING:
+                return text.span(node.start, node.end)
+        elif isinstance(node, syntax.If | syntax.Match | syntax.While | syntax.Assign | syntax.ProgramText):
             if depth > NESTING:
-                span: Span = getattr(node, "span")  # noqa: B009 - every node of the syntax has one
-                return span
+                return node.span
             stack.extend((getattr(node, f.name), depth + 1) for f in fields(node))
     return None
 
 
+def _token(kind: str, at: Token, text: str | None = None) -> lexer.Token:
+    return lexer.Token(kind, str(at) if text is None else text, at.start_pos or 0, at.end_pos or 0)
+
+
+def _tree(kind: Any, meta: Any, *parts: Any) -> Any:
+    """A tree of RCL's syntax, whose depth is above that of its parts."""
+    inner = [p for part in parts for p in (part if isinstance(part, tuple) else (part,))]
+    depth = 1 + max((p.depth for p in inner if isinstance(p, rcl.TermSyntax)), default=0)
+    return kind(meta.start_pos, meta.end_pos, depth, *parts)
+
+
 @v_args(meta=True)
 class _Build(Transformer_NonRecursive):  # type: ignore[misc]
-    """Syntax tree from Lark's, without recursion. `place` is that of every part, if it is given."""
+    """Syntax tree from Lark's, without recursion."""
 
-    def __init__(self, file: str, place: Span | None = None) -> None:
+    def __init__(self, text: Source) -> None:
         super().__init__()
-        self._file, self._place = file, place
+        self._text = text
 
     def _span(self, meta: Any) -> Span:
-        if self._place is not None:
-            return self._place
-        if meta.empty:
-            return Span(self._file, 1, 1, 1, 1)
-        return Span(self._file, meta.line, meta.column, meta.end_line, meta.end_column)
+        return self._text.span(0, 0) if meta.empty else self._text.span(meta.start_pos, meta.end_pos)
 
-    def program(self, meta: Any, items: list[Any]) -> syntax.Source:
+    def program(self, meta: Any, items: list[Any]) -> syntax.ProgramText:
         declarations = tuple(item for item in items if isinstance(item, syntax.Declaration))
         memory = tuple(item for item in items if isinstance(item, syntax.Memory))
-        return syntax.Source(declarations, memory, items[-1], self._span(meta))
+        return syntax.ProgramText(declarations, memory, items[-1], self._text, self._span(meta))
 
     def body(self, meta: Any, items: list[Any]) -> tuple[Any, ...]:
         return tuple(item for item in items if item is not None)
@@ -187,70 +200,74 @@ class _Build(Transformer_NonRecursive):  # type: ignore[misc]
     def arguments(self, meta: Any, items: list[Any]) -> tuple[Any, ...]:
         return tuple(items)
 
-    def comparator(self, meta: Any, items: list[Any]) -> str:
-        return "==" if items[0] == "=" else str(items[0])
+    def comparator(self, meta: Any, items: list[Token]) -> lexer.Token:
+        text = "==" if items[0] == "=" else str(items[0])
+        return _token(lexer.SYMBOLS[text], items[0], text)
 
-    def compare(self, meta: Any, items: list[Any]) -> syntax.Expression:
-        span = self._span(meta)
-        if len(items) == 3:
-            return syntax.Binary(items[1], items[0], items[2], span)
-        return syntax.Chain(tuple(items[::2]), tuple(items[1::2]), span)
+    def compare(self, meta: Any, items: list[Any]) -> Any:
+        return _tree(rcl.Comparison, meta, tuple(items[::2]), tuple(items[1::2]))
 
-    def member(self, meta: Any, items: list[Any]) -> syntax.Member:
-        return syntax.Member(items[0], items[2], items[1].type == "NOT_IN", self._span(meta))
+    def member(self, meta: Any, items: list[Any]) -> Any:
+        return self.inside(meta, [*items[:2], _tree(rcl.SetDisplay, meta, items[2])])
 
-    def inside(self, meta: Any, items: list[Any]) -> syntax.Inside:
-        return syntax.Inside(items[0], items[2], items[1].type == "NOT_IN", self._span(meta))
+    def inside(self, meta: Any, items: list[Any]) -> Any:
+        return _tree(rcl.Comparison, meta, (items[0], items[2]), (_token(items[1].type, items[1]),))
 
-    def several(self, meta: Any, items: list[Any]) -> syntax.Tuple:
-        return syntax.Tuple(tuple(items), self._span(meta))
+    def several(self, meta: Any, items: list[Any]) -> Any:
+        return _tree(rcl.TupleDisplay, meta, tuple(items))
 
-    def sequence(self, meta: Any, items: list[Any]) -> syntax.Sequence:
-        return syntax.Sequence(items[0] or (), self._span(meta))
+    def sequence(self, meta: Any, items: list[Any]) -> Any:
+        return _tree(rcl.SequenceDisplay, meta, items[0] or ())
 
     @staticmethod
     def _infix(operator: str) -> Any:
-        def build(self: _Build, meta: Any, items: list[Any]) -> syntax.Binary:
-            return syntax.Binary(operator, items[0], items[-1], self._span(meta))
+        def build(self: _Build, meta: Any, items: list[Any]) -> Any:
+            operands = (items[0], items[-1])
+            if operator in (*rcl.Sign,):
+                return _tree(rcl.Connective, meta, rcl.Sign(operator), operands)
+            sign = lexer.Token(lexer.SYMBOLS[operator], operator, meta.start_pos, meta.end_pos)
+            return _tree(rcl.Calculation, meta, operands, (sign,))
 
         return build
 
     iff, implies, disjoin, conjoin = map(_infix, ("<=>", "->", "or", "and"))
     add, subtract, multiply, divide = map(_infix, "+-*/")
 
-    def negate(self, meta: Any, items: list[Any]) -> syntax.Unary:
-        return syntax.Unary("not", items[1], self._span(meta))
+    def negate(self, meta: Any, items: list[Any]) -> Any:
+        return _tree(rcl.Negation, meta, items[1])
 
-    def minus(self, meta: Any, items: list[Any]) -> syntax.Unary:
-        return syntax.Unary("-", items[0], self._span(meta))
+    def minus(self, meta: Any, items: list[Any]) -> Any:
+        return _tree(rcl.Minus, meta, items[0])
 
-    def number(self, meta: Any, items: list[Any]) -> syntax.Number:
-        return syntax.Number(Fraction(str(items[0])), "." not in items[0], self._span(meta))
+    def number(self, meta: Any, items: list[Any]) -> Any:
+        return _tree(rcl.Number, meta, str(items[0]))
 
-    def string(self, meta: Any, items: list[Any]) -> syntax.Text:
-        inner = str(items[0])[1:-1]
-        return syntax.Text(inner.replace('\\"', '"').replace("\\\\", "\\"), self._span(meta))
+    def string(self, meta: Any, items: list[Any]) -> Any:
+        return _tree(rcl.Text, meta, str(items[0]))
 
-    def truth(self, meta: Any, items: list[Any]) -> syntax.Truth:
-        return syntax.Truth(items[0].type == "TRUE", self._span(meta))
+    def truth(self, meta: Any, items: list[Any]) -> Any:
+        return _tree(rcl.Truth, meta, items[0].type == "TRUE")
 
-    def reference(self, meta: Any, items: list[Any]) -> syntax.Name:
-        prefix, _, name = str(items[0]).rpartition(".")
-        return syntax.Name(name, prefix or None, self._span(meta))
+    def reference(self, meta: Any, items: list[Any]) -> Any:
+        role, dot, name = str(items[0]).rpartition(".")
+        return _tree(rcl.PortName, meta, role, name) if dot else _tree(rcl.Name, meta, name)
 
     def name(self, meta: Any, items: list[Any]) -> syntax.Name:
-        return syntax.Name(str(items[0]), None, self._span(meta))
+        return syntax.Name(str(items[0]), self._span(meta))
 
-    def call(self, meta: Any, items: list[Any]) -> syntax.Call:
-        return syntax.Call(items[0], items[1], self._span(meta))
+    def call(self, meta: Any, items: list[Any]) -> Any:
+        return _tree(rcl.Application, meta, items[0], items[1])
 
-    def group(self, meta: Any, items: list[Any]) -> tuple[tuple[syntax.Name, ...], str]:
-        return tuple(item for item in items if isinstance(item, syntax.Name)), str(items[-1])
+    def group(self, meta: Any, items: list[Token]) -> rcl.Binder:
+        *names, _, sort = items
+        kind = rcl.BuiltinName if sort in BUILTINS else rcl.Name
+        domain = kind(sort.start_pos or 0, sort.end_pos or 0, 1, str(sort))
+        return rcl.Binder(meta.start_pos, meta.end_pos, 1, tuple(_token("NAME", n) for n in names), domain)
 
-    def quantified(self, meta: Any, items: list[Any]) -> syntax.Quantification:
-        groups = tuple(item for item in items[1:] if isinstance(item, tuple))
-        kind = "forall" if items[0].type == "FORALL" else "exists"
-        return syntax.Quantification(kind, groups, items[-1], self._span(meta))
+    def quantified(self, meta: Any, items: list[Any]) -> Any:
+        groups = tuple(item for item in items[1:] if isinstance(item, rcl.Binder))
+        kind = Quantifier.FORALL if items[0].type == "FORALL" else Quantifier.EXISTS
+        return _tree(rcl.Quantification, meta, kind, groups, items[-1])
 
 
 # -- blocks by indentation ---------------------------------------------------------------------------------------------

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from fractions import Fraction
+from dataclasses import fields, is_dataclass
+from typing import Any
 
 import pytest
 
@@ -10,6 +11,8 @@ from avow.backends.hoare import syntax
 from avow.backends.hoare.parser import parse_program
 from avow.backends.hoare.tuning import NESTING
 from avow.base.diagnostics import Diagnostic, Rejected
+from avow.language.lexer import Token
+from avow.language.syntax import Connective, Sign
 
 PAPER = """input := radiation_at(i)
 IF (input < 120) THEN 
@@ -22,7 +25,7 @@ ELSE
 """  # noqa: W291 - as the paper prints it
 
 
-def parse(text: str) -> syntax.Source:
+def parse(text: str) -> syntax.ProgramText:
     return parse_program(text, "p.imp")
 
 
@@ -33,15 +36,23 @@ def fault(text: str) -> Diagnostic:
     return diagnostic
 
 
+def placeless(part: Any) -> Any:
+    """Statements without the places of their expressions."""
+    if isinstance(part, tuple):
+        return part if isinstance(part, Token) else tuple(map(placeless, part))
+    if not is_dataclass(part):
+        return part
+    named = {f.name: getattr(part, f.name) for f in fields(part) if f.name not in ("start", "end", "span")}
+    return type(part), {name: placeless(value) for name, value in named.items()}
+
+
 def test_the_papers_listing_parses_as_printed() -> None:
     assign, branch = parse(PAPER).body
     assert isinstance(assign, syntax.Assign)
     assert isinstance(branch, syntax.If)
     (inner,) = branch.otherwise
     assert isinstance(inner, syntax.If)
-    assert [s.value for s in inner.otherwise if isinstance(s, syntax.Assign)] == [  # type: ignore[comparison-overlap]
-        s.value for s in parse("x := red").body if isinstance(s, syntax.Assign)
-    ]
+    assert placeless(inner.otherwise) == placeless(parse("output := red").body)
 
 
 def test_equals_in_place_of_assignment_is_told_with_its_cure() -> None:
@@ -61,7 +72,7 @@ def test_equals_in_place_of_assignment_is_told_with_its_cure() -> None:
     ],
 )
 def test_layouts_of_one_program(text: str) -> None:
-    assert parse(text).body == parse("IF a THEN\n  x := 1\nELSE\n  y := 2\nz := 3").body
+    assert placeless(parse(text).body) == placeless(parse("IF a THEN\n  x := 1\nELSE\n  y := 2\nz := 3").body)
 
 
 def test_else_belongs_to_the_if_of_its_column() -> None:
@@ -108,12 +119,11 @@ def test_match_while_maps_and_declarations() -> None:
     assert loop.variant is not None
 
 
-def test_precedence_and_numbers() -> None:
+def test_precedence() -> None:
     (statement,) = parse("x := a + 2.50 * b < c and not d or e").body
     assert isinstance(statement, syntax.Assign)
-    assert isinstance(statement.value, syntax.Binary)
-    assert statement.value.operator == "or"
-    assert Fraction("2.50") == Fraction(5, 2)
+    assert isinstance(statement.value, Connective)
+    assert statement.value.sign is Sign.OR
 
 
 @pytest.mark.parametrize(

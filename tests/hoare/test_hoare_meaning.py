@@ -12,12 +12,11 @@ from helpers import some
 from avow.backends.hoare import wp
 from avow.backends.hoare.checker import Checked, check
 from avow.backends.hoare.interpreter import Fault, Machine
-from avow.backends.hoare.names import Names, vocabulary
 from avow.backends.hoare.outline import outline
 from avow.backends.hoare.parser import parse_expression, parse_program
 from avow.backends.hoare.simplify import simplify
 from avow.backends.hoare.triples import Triple
-from avow.backends.hoare.typing import Scope, formula
+from avow.backends.hoare.typing import Expressions, Names
 from avow.backends.hoare.wp import Conditions, weakest
 from avow.base.diagnostics import Span
 from avow.base.verdict import Verdict
@@ -25,6 +24,8 @@ from avow.evaluation.evaluate import evaluate
 from avow.formulas.values import Data, Element, FunctionValue, Value
 from avow.language.contract import Contract
 from avow.language.load import check_text
+from avow.language.scope import of_contract
+from avow.language.sorts import BOOL
 from avow.language.terms import TRUE, Or, Term
 from avow.solving.questions import entails
 
@@ -143,8 +144,9 @@ def checked(text: str) -> Checked:
 
 
 def assertion(text: str, made: Checked) -> Term:
-    names = Names(vocabulary(CONTRACT, NODE), {v.name: v.sort for v in made.program.state})
-    return formula(parse_expression(text, PLACE), Scope(names, quantifiers=True))
+    names = Names(of_contract(CONTRACT), {v.name: v.sort for v in made.program.state})
+    written = parse_expression(text, PLACE)
+    return Expressions(names, written.text, {}, asserts=True).read(written.tree, BOOL)
 
 
 def state(chance: random.Random, made: Checked) -> dict[str, Value]:

@@ -107,15 +107,15 @@ def test_is_refuted_by_a_run(tmp_path: Path, program: str, formula: str, assume:
     ("program", "message"),
     [
         ("loads[0] := 1", "no map"),
-        ("x := []\ntotal := 1", "nothing says of what the sequence `x` is"),
-        ("seen := [] == []", "nothing says of what these sequences are"),
-        ("total := length(mode)", "takes one sequence"),
+        ("x := []\ntotal := 1", "nothing says of what this sequence is"),
+        ("seen := [] == []", "nothing says of what this sequence is"),
+        ("total := length(mode)", "`length` is of a sequence"),
         ("seen := mode in k", "wants a set or a sequence"),
-        ("total := loads(0.5)", "NATURAL is wanted"),
-        ("total := loads(0, 1)", "takes 1 argument"),
+        ("total := loads(0.5)", "a position in a sequence is a whole number"),
+        ("total := loads(0, 1)", "takes one position"),
         ("pair := (mode, 1, 2)", "is wanted here"),
         ("path := [mode]", "is wanted here"),
-        ("path := [1, mode]", "is wanted here"),
+        ("path := [1, mode]", "the items of a sequence are of one type"),
     ],
 )
 def test_is_rejected_with_its_place(tmp_path: Path, program: str, message: str) -> None:
