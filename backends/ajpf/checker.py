@@ -21,7 +21,7 @@ from .psl import Atom, Formula, Modality, Not, atoms, automaton_of, compiled, co
 from .syntax import DeedKind, Sign
 from .tautology import Laws, is_valid, standing
 from .terms import Struct, Term, named_apart, unify
-from .tuning import LAZY_STATES
+from .tuning import NEARBY
 
 
 @dataclass(frozen=True, slots=True)
@@ -224,7 +224,7 @@ class Checker:
     def lasso(self, refuted: Property) -> Lasso | None:
         """A run of the agent itself on which the property fails; if possible, one among the states found first."""
         automaton, fair, labels = self._projected(refuted, self.labels)
-        graph, few = self.graph, range(LAZY_STATES)
+        graph, few = self.graph, range(NEARBY)
 
         def nearby(state: int) -> list[int]:
             return [target for target in graph.after(state) if target in few]

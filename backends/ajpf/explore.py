@@ -33,8 +33,6 @@ class Graph:
     unfinished: str | None = None
     """Why states are missing: the unexplored ones have no successors. A run within the explored part is still a run of
     the agent."""
-    settles: bool = False
-    """The missing states do not matter to the property for which the others were explored (`lazy`)."""
 
     def __len__(self) -> int:
         return len(self.states)

@@ -22,14 +22,13 @@ from .ajpf_tool import Installation, Said
 from .asking import ask
 from .beliefs import TooDeep
 from .checker import Checker, OutOfTime, Property, asks_for_percepts
-from .explore import Graph, System, explore
+from .explore import explore
 from .instances import Instantiation, instances
-from .lazy import open_part
 from .options import Setup, read
 from .replay import Run, replay, sampled
 from .settle import Frame, Settled, outcome
 from .society import system
-from .tuning import GRACE, LAZY_SHARE, LAZY_STATES, PART_STATES, SAMPLED_RUNS
+from .tuning import GRACE, SAMPLED_RUNS
 from .words import Wording, explain
 
 ENGINE = "Avow's own Gwendolen checker"
@@ -107,18 +106,7 @@ class _Run:
     def explored(self, properties: Sequence[Property], probed: bool) -> None:
         setup = self.setup
         agents = system(setup.programs, setup.environment, setup.semantics, probed=probed)
-
-        def reached(states: int) -> Graph:
-            megabytes = self.limits.megabytes
-            return explore(agents, states=states, seconds=self.left(), megabytes=megabytes)
-
-        graph = reached(min(LAZY_STATES, setup.states))
-        if graph.unfinished is not None:
-            properties = [p for p in properties if not self.settled_early(agents, p)]
-            if not properties:
-                return
-            if len(graph) > LAZY_STATES:
-                graph = reached(setup.states)
+        graph = explore(agents, states=setup.states, seconds=self.left(), megabytes=self.limits.megabytes)
         self.bound["states"] += len(graph)
         self.bound["transitions"] += graph.transitions
         if graph.unfinished is not None:
@@ -134,20 +122,6 @@ class _Run:
             self.results[p.key] = self.one(checker, p)
             self.checkers[p.key] = checker
 
-    def settled_early(self, agents: System, p: Property) -> bool:
-        """Whether the property was decided on the part of the state space that it needs (`lazy.open_part`)."""
-        try:
-            part = open_part(agents, p, min(PART_STATES, self.setup.states), self.left() * LAZY_SHARE)
-        except (TooDeep, TooLarge, RecursionError):
-            return False
-        if part is None:
-            return False
-        self.bound["states"] += len(part)
-        self.bound["transitions"] += part.transitions
-        self.checkers[p.key] = Checker(part, [p])
-        self.results[p.key] = self.one(self.checkers[p.key], p)
-        return True
-
     def one(self, checker: Checker, p: Property) -> Settled:
         try:
             result = checker.check(p, self.deadline)
@@ -156,7 +130,7 @@ class _Run:
         except (TooLarge, RecursionError):
             return Settled(Verdict.UNKNOWN, "the property's automaton is too large")
         unfinished = checker.graph.unfinished
-        if result.holds and unfinished is not None and not checker.graph.settles:
+        if result.holds and unfinished is not None:
             return Settled(Verdict.UNKNOWN, f"not refuted, but the state space is unfinished: {unfinished}")
         refutes = (p.forbidden is None or result.answered) and not p.indecisive
         answer = Verdict.CHECKED if result.holds else Verdict.REFUTED

@@ -18,9 +18,6 @@ INTENTIONS = 6
 PROPERTIES = 5_000
 """Instances of one guarantee: each is a property that is checked by itself."""
 
-TAIL = 5_000
-"""Steps for which a bad prefix is followed until a state repeats: a run has to be shown whole."""
-
 INDEX_VALUES = 1_000
 """Values of one index of a mapping's row, which are written out."""
 
@@ -54,14 +51,8 @@ SAMPLED_STEPS = 400
 GRACE = 0.5
 """The part of the time limit that may be used beyond it to find violations in the explored states."""
 
-LAZY_STATES = 200_000
-"""States after which the properties are checked one by one, each on the part of the state space that it needs."""
-
-PART_STATES = 20_000
-"""States of such a part."""
-
-LAZY_SHARE = 0.02
-"""The part of the remaining time that one property may use for that."""
+NEARBY = 200_000
+"""States among which a run that refutes a property is sought first: it is found sooner, and is shorter."""
 
 FORMULA_DEPTH = 120
 """Deeper guarantees are refused by name: the translation recurses."""
