@@ -12,7 +12,7 @@ from avow.backend_kit.protocol import COMMON_OPTIONS, Job
 from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.base.files import inside, read_regular
 from avow.base.remembered import Shelf
-from avow.base.suggestions import suggest
+from avow.base.suggestions import nearby, suggest
 from avow.system.plan import Located
 
 
@@ -58,13 +58,13 @@ def existing_file(job: Job, key: str, name: str, *, wrong: str, absent: str, hin
     in the system's folder, with code `absent` if no file is there; `hint` says how to get one."""
     place = job.method.options.at(key)
     if not name:
-        message = f"{job.method.backend} needs '{key}': a file of the system's folder"
-        raise Rejected(Diagnostic(wrong, message, place))
+        raise Rejected(Diagnostic(wrong, f"{job.method.backend} needs '{key}': a file of the system's folder", place))
     path = inside(job.root, name)
     if path is None:
         raise Rejected(Diagnostic(wrong, f"'{name}' is not a file in the system's folder", place))
     if not path.is_file():
-        raise Rejected(Diagnostic(absent, f"there is no file '{name}' in {job.root.name}/", place, hint=hint))
+        message = f"there is no file '{name}' in {job.root.name}/"
+        raise Rejected(Diagnostic(absent, message, place, hint=nearby(path) or hint))
     return path
 
 

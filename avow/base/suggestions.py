@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from pathlib import Path
 
 
 def nearest(name: str, known: Iterable[str], most: int = 1, *, alike: float = 0.6) -> list[str]:
@@ -30,6 +31,12 @@ def suggest(name: str, known: Iterable[str]) -> str | None:
         return None
     shown = ", ".join(names[:12]) + (", …" if len(names) > 12 else "")
     return _hint(nearest(name, names)) or f"known: {shown}"
+
+
+def nearby(path: Path) -> str | None:
+    """A hint for a path that does not exist: what is beside it, if a name is near. Never raises."""
+    beside = [each.name for each in path.parent.iterdir()] if path.parent.is_dir() else []
+    return did_you_mean(path.name, beside)
 
 
 def _hint(near: list[str]) -> str | None:

@@ -78,13 +78,7 @@ def progress(total: int) -> Iterator[Progress]:
 @seconds_option(10.0)
 @seed_option()
 def command(
-    path: Path,
-    goals: tuple[str, ...],
-    as_json: bool,
-    as_latex: bool,
-    as_rcl: bool,
-    seconds: float,
-    seed: int,
+    path: Path, goals: tuple[str, ...], as_json: bool, as_latex: bool, as_rcl: bool, seconds: float, seed: int
 ) -> int:
     """Combine the contracts of a system's nodes by the rules R1-R4, and discharge the side conditions and the
     requirements that have a formula.

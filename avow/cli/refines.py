@@ -30,13 +30,7 @@ from avow.system.load import load_system
 @seconds_option(10.0)
 @seed_option()
 def command(
-    concrete: Path,
-    abstract: Path,
-    node: str | None,
-    renames: tuple[str, ...],
-    as_json: bool,
-    seconds: float,
-    seed: int,
+    concrete: Path, abstract: Path, node: str | None, renames: tuple[str, ...], as_json: bool, seconds: float, seed: int
 ) -> int:
     """Does CONCRETE refine ABSTRACT: assume no more, and guarantee no less?
 

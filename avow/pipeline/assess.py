@@ -157,10 +157,7 @@ def build(state: State, surveyed: Survey, basis: _Basis) -> Case:
                 state.run.fresh,
                 f"doit verify:{system.name}",
                 head(workspace.root),
-                {
-                    "seconds for each tool": _seconds_in_words(),
-                    "seed": "0, unless the plan says otherwise",
-                },
+                {"seconds for each tool": _seconds_in_words(), "seed": "0, unless the plan says otherwise"},
             ),
             derivations=_derivation_views(system),
             discharging=_discharging(system),

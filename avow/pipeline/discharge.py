@@ -46,12 +46,7 @@ def open_obligations(workspace: Workspace, work: Work, run: Run) -> tuple[Obliga
 
 
 def _is_settled(
-    workspace: Workspace,
-    work: Work,
-    refuted: Sequence[Entry],
-    entries: Sequence[Entry],
-    run: Run,
-    intact: Intact,
+    workspace: Workspace, work: Work, refuted: Sequence[Entry], entries: Sequence[Entry], run: Run, intact: Intact
 ) -> bool:
     found = [e for e in entries if not outlived(e, refuted)]
     records = [e.evidence for e in found if still_counts(e.evidence, workspace.root, work.system, run)]

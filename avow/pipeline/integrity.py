@@ -18,11 +18,7 @@ from avow.pipeline.workload import Survey
 
 
 def discrepancies(
-    workspace: Workspace,
-    ledger: Ledger,
-    surveyed: Survey | None,
-    anchors: Sequence[Anchor] = (),
-    strict: bool = False,
+    workspace: Workspace, ledger: Ledger, surveyed: Survey | None, anchors: Sequence[Anchor] = (), strict: bool = False
 ) -> tuple[Discrepancy, ...]:
     """Everything that the audit finds. Without a survey (a contract that cannot be read) keys are not compared, and the
     audit reports that. `anchors` name heads that the ledger must hold. Raises OSError."""

@@ -55,10 +55,7 @@ def write_indexes(workspace: Workspace, works: Iterable[Work], case: Case) -> tu
 def _page(workspace: Workspace, node: Node, works: Sequence[Work], claims: Sequence[ObligationView]) -> str:
     system = works[0].system.name
     checks = {work.method: _checks(workspace, work) for work in works}
-    parts = [
-        f"# {escaped(node.name)} of {escaped(system)}",
-        _INTRODUCTION.format(shlex.quote(f"{system}/{node.name}")),
-    ]
+    parts = [f"# {escaped(node.name)} of {escaped(system)}", _INTRODUCTION.format(shlex.quote(f"{system}/{node.name}"))]
     for view in claims:
         name = view.obligation.name
         parts += [f"## {escaped(name)}: {view.standing.value}", escaped(view.obligation.claim)]

@@ -105,11 +105,7 @@ def _runs(asked: Sequence[str]) -> bool:
 
 
 def execute(
-    root: Path,
-    tasks: Sequence[str],
-    jobs: int = 2,
-    answer: IO[str] | None = None,
-    remote: Remote | None = None,
+    root: Path, tasks: Sequence[str], jobs: int = 2, answer: IO[str] | None = None, remote: Remote | None = None
 ) -> int:
     """Run tasks of a workspace as doit does, in its folder; the exit code. `answer`, `remote`: as `Pipeline` has
     them."""

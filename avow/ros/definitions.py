@@ -11,7 +11,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import field
 
 from avow.base.records import dataclass
-from avow.base.suggestions import suggest
+from avow.base.suggestions import did_you_mean, suggest
 
 INTEGERS: Mapping[str, tuple[int, int]] = {
     **{f"int{bits}": (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1) for bits in (8, 16, 32, 64)},
@@ -23,10 +23,7 @@ SCALARS = frozenset((*INTEGERS, *FLOATS, "bool", "string", "wstring", "time", "d
 
 OTHER_NAMES = {"byte": "uint8", "char": "uint8", "float": "float32", "double": "float64", "octet": "uint8"}
 """Names of built-in types that ROS or IDL also uses."""
-TIMES = {
-    "builtin_interfaces/Time": "time",
-    "builtin_interfaces/Duration": "duration",
-}
+TIMES = {"builtin_interfaces/Time": "time", "builtin_interfaces/Duration": "duration"}
 HEADER = "std_msgs/Header"
 
 
@@ -103,6 +100,10 @@ class WrongDefinition(Exception):  # noqa: N818 - it is what was found wrong
 class NoField(Exception):  # noqa: N818 - it is what was found wrong
     """A path that does not exist in a definition; the text says why."""
 
+    def __init__(self, message: str, hint: str | None = None) -> None:
+        super().__init__(message)
+        self.hint = hint
+
 
 @dataclass(frozen=True, slots=True)
 class Definitions:
@@ -161,8 +162,10 @@ class Definitions:
             holder = inner
             found = inner.field(step)
             if found is None:
-                names = ", ".join(f.name for f in inner.fields)
-                raise NoField(f"{inner.name} has no field {step!r}; it has {names or 'none'}")
+                names, package = [f.name for f in inner.fields], inner.name.partition("/")[0]
+                others = (m.name for m in self.messages.values() if m.name.startswith(f"{package}/") and m.field(step))
+                hint = did_you_mean(step, names) or ", ".join(f"{other} has such a field" for other in others) or None
+                raise NoField(f"{inner.name} has no field {step!r}; it has {', '.join(names) or 'none'}", hint)
             wire = found.wire
         return wire, holder
 

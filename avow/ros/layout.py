@@ -62,10 +62,9 @@ class Layout:
         size = len(self.raw) + start
         if set(map(len, raws)) != {size}:
             return None
-        whole = b"".join(raws)
 
         def at(place: int, form: str) -> npt.NDArray[np.generic]:
-            return np.ndarray((len(raws),), form, whole, place + start, (size,))
+            return np.ndarray((len(raws),), form, b"".join(raws), place + start, (size,))
 
         if any((at(place, "<u4") != length).any() for place, length in self.lengths):
             return None

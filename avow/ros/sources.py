@@ -70,8 +70,7 @@ def distribution(distro: str) -> Mapping[str, Message]:
     """The message types of a distribution's common packages."""
     from rosbags.typesys import Stores, get_typestore
 
-    store = get_typestore(Stores(DISTRIBUTIONS[distro]))
-    return from_store(store.fielddefs, distro)
+    return from_store(get_typestore(Stores(DISTRIBUTIONS[distro])).fielddefs, distro)
 
 
 def from_store(fielddefs: Mapping[str, Any], source: str) -> dict[str, Message]:

@@ -15,7 +15,7 @@ import yaml
 
 from avow.base.diagnostics import Diagnostic, Severity, Span
 from avow.base.files import inside, read_regular
-from avow.base.suggestions import suggest
+from avow.base.suggestions import nearby, suggest
 from avow.base.workspace import find_workspace
 from avow.language.contract import Contract, Node
 from avow.ros.launch import Launched, Setting, Started, read_launch
@@ -41,7 +41,8 @@ def read_launched(plan: Path, pieces: Iterable[Piece]) -> tuple[Launched | None,
             message = f"the path {named.text[:200]!r} leads out of the workspace"
             faults.append(Diagnostic("PLAN108", message, named.span))
         elif not path.is_file():
-            faults.append(Diagnostic("PLAN107", f"there is no file {named.text!r} in {folder}", named.span))
+            message = f"there is no file {named.text!r} in {folder}"
+            faults.append(Diagnostic("PLAN107", message, named.span, hint=nearby(path)))
         else:
             given = piece.at("args")
             entries = (given.entries or {}) if given is not None else {}

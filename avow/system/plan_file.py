@@ -15,6 +15,7 @@ from typing import Any, TypeVar
 from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.base.files import inside, read_regular, sha256
 from avow.base.remembered import Shelf
+from avow.base.suggestions import nearby
 from avow.ros.names import Placed, Resolver, is_name
 from avow.system.hazards import read_hazards
 from avow.system.launched import read_launched
@@ -168,16 +169,14 @@ class _PlanReader:
         path = inside(self.path.parent, piece.text)
         if path is None:
             shown = piece.text if len(piece.text) <= 200 else piece.text[:197] + "…"
-            what = (
-                "leads out of the system's folder" if shown == piece.text else "is too long, or leads out of the folder"
-            )
+            what = "leads out of the system's folder" if shown == piece.text else "is too long, or leads out of it"
             self.fault("PLAN108", f"the path {shown!r} {what}", piece.span)
         return path
 
     def present(self, piece: Piece, path: Path) -> bool:
         if path.exists():
             return True
-        self.fault("PLAN107", f"there is no file {piece.text!r} in {self.path.parent}", piece.span)
+        self.fault("PLAN107", f"there is no file {piece.text!r} in {self.path.parent}", piece.span, nearby(path))
         return False
 
     def paths(self, *keys: str) -> Iterator[tuple[Piece, Path]]:

@@ -12,7 +12,7 @@ from avow.backend_kit.protocol import Job
 from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.base.plain import alike, exact
 from avow.base.records import dataclass
-from avow.base.suggestions import suggest
+from avow.base.suggestions import nearest, suggest
 from avow.kernel.rates import Trial
 from avow.language.sorts import BOOL, REAL, Sort
 
@@ -266,7 +266,8 @@ class _Reader:
     def _runs(self, table: Table, named: list[str], bindings: list[Binding]) -> tuple[Run, ...]:
         column = self.options.get("run_column") or next((n for n in RUN_COLUMNS if n in table.columns), None)
         if column is None:
-            hint = "name it under 'run_column': without one, a copied row would count as another run"
+            near = next((f"`{n}`: did you mean `{m}`? " for m in RUN_COLUMNS for n in nearest(m, table.columns)), "")
+            hint = f"{near}Name it under 'run_column': without one, a copied row would count as another run"
             self.found.append(table.fault(1, "EXP112", "no column identifies a run", hint))
             return ()
         strata = self.options.get("strata", "")

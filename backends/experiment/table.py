@@ -11,6 +11,7 @@ from avow.backend_kit.given import file_text
 from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.base.plain import alike
 from avow.base.records import dataclass
+from avow.base.suggestions import suggest
 
 from .tuning import ROWS, TABLE_BYTES
 
@@ -33,8 +34,7 @@ class Table:
     def confused(self, wanted: str) -> Diagnostic | None:
         """The error of a column that the plan names, if any."""
         if wanted not in self.columns:
-            hint = f"columns: {', '.join(self.columns)}"
-            return self.fault(1, "EXP112", f"there is no column '{wanted}'", hint)
+            return self.fault(1, "EXP112", f"there is no column '{wanted}'", suggest(wanted, self.columns))
         others = [name for name in self.columns if name != wanted and alike(name) == alike(wanted)]
         if others:
             return self.fault(1, "EXP112", f"the column '{wanted}' looks like {', '.join(map(repr, others))}")

@@ -15,6 +15,7 @@ from avow.base.codec import document
 from avow.base.codes import Catalogue
 from avow.base.diagnostics import Diagnostic, Severity
 from avow.base.files import inside, read_text
+from avow.base.suggestions import nearby
 from avow.base.tools import Tool, works
 from avow.base.verdict import Link, Object, Verdict
 from avow.ros.sources import message_files
@@ -74,12 +75,16 @@ class RosMonitoringBackend(Backend):
         problems = [*faults, *readings(found, job.method.options.at("mapping")), *overheads(job)[1]]
         for at, (name, digest) in enumerate(_traces(job).items()):
             path, span = inside(job.root, name), job.method.options.at("traces", at)
-            if path is None or not (digest or path.exists()):
-                problems.append(Diagnostic("MON102", f"traces: there is no file {name!r} in the system's folder", span))
+            hint = nearby(job.root / name)
+            if path is None or (not path.exists() and (hint or not digest)):  # of a bag with a digest, git has no copy
+                message = f"traces: there is no file {name!r} in the system's folder"
+                severity = Severity.WARNING if digest else Severity.ERROR
+                problems.append(Diagnostic("MON102", message, span, severity, hint))
             elif digest and path.exists() and (there := digest_trace(path)) != digest:
                 message = f"traces: {name!r} is not the recording that the plan names: its digest is {there}"
                 hint = "put the recording there, or write this digest if it is the one that is meant"
                 problems.append(Diagnostic("MON102", message, span, hint=hint))
+        bags = not any(name.endswith(".jsonl") for name in _traces(job))  # whose messages have their types' fields only
         for obligation in job.obligations:
             clause = job.clause(obligation)
             problems += unholdable(found, clause)
@@ -87,7 +92,7 @@ class RosMonitoringBackend(Backend):
                 continue
             spoken = {v.qualified for v in free_variables(clause.formula)}
             hidden = next((reason for name, reason in found.hidden.items() if name in spoken), "")
-            if reason := unmonitored(found, clause):
+            if reason := unmonitored(found, clause) or (found.unmarked(spoken) if bags else ""):
                 message = f"{clause.name} cannot be monitored: {reason}"
                 problems.append(Diagnostic("MON103", message, clause.span, Severity.WARNING))
             elif hidden:
@@ -146,8 +151,7 @@ class RosMonitoringBackend(Backend):
         from .rml.translate import translate
 
         options = method_of(system, node.name)
-        found = usable(system, node, options)
-        made = translate(found, node.guarantees)
+        made = translate(usable(system, node, options), node.guarantees)
         hint = None if options else f"the plan has no method {self.name} for node {node.name}, whose `mapping` says how"
         missing = tuple(
             Diagnostic("MON105", f"{node.name}.{name}: {reason}", node.clause(name).span, Severity.WARNING, hint)

@@ -18,7 +18,6 @@ from typing import Any
 
 import numpy as np
 
-from avow.base.diagnostics import Diagnostic, Rejected
 from avow.evaluation.evaluate import NotEvaluable
 from avow.ros.bags import ENVELOPE, LIVE, Event
 
@@ -30,7 +29,7 @@ from .pace import SEQUENCE, sequence
 from .paired import Paired
 from .pairing import ticks_at, time_of
 from .rules import Previous, heard_through
-from .traces import chunks, parsed
+from .traces import chunks, parsed, unread
 from .tuning import REMEMBERED, TOPICS_KEPT
 from .watched import Violation, Watched
 
@@ -319,7 +318,7 @@ class Columns:
             with path.open("rb") as stream:
                 yield from self.lines(stream.read1, str(path))
         except OSError as error:
-            raise Rejected(Diagnostic("MON201", f"cannot read {path}: {error.strerror or error}")) from None
+            raise unread(path, error) from None
 
     def lines(self, read: Callable[[int], bytes], name: str) -> Found:
         """Judge the lines of a stream, which `read` returns as they come (empty at its end): the line, and the

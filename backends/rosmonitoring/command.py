@@ -204,8 +204,7 @@ def _report(running: Session, violations: Iterator[tuple[int, Violation]], trace
         _draw(running, Path(trace), marks, output.timeline)
     if output.as_json:
         digest = "" if trace in ("-", "") else digest_trace(Path(trace))
-        whole = {**running.summary(), "trace": trace, "sha256": digest, "violations": shown}
-        click.echo(document(whole))
+        click.echo(document({**running.summary(), "trace": trace, "sha256": digest, "violations": shown}))
     else:
         for (node, clause, fault), count in () if output.show_all else counts.items():
             if count > VIOLATIONS_SHOWN:

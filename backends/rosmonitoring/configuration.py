@@ -69,8 +69,7 @@ def of_system(parts: Sequence[tuple[Setup, Mapping[str, Any]]]) -> str:
 def _nodes(setup: Setup, options: Mapping[str, Any]) -> list[dict[str, Any]]:
     if not {"package", "path"} <= options.keys():
         return []
-    node = {"name": setup.node.name, "package": str(options["package"]), "path": str(options["path"])}
-    return [{"node": node}]
+    return [{"node": {"name": setup.node.name, "package": str(options["package"]), "path": str(options["path"])}}]
 
 
 def _file(monitors: list[dict[str, Any]], nodes: list[dict[str, Any]], version: object) -> str:

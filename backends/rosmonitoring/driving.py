@@ -137,8 +137,7 @@ def _different(found: Driver, topics: Iterable[Compared]) -> Iterator[str]:
             there = json.dumps(
                 fields_of(raw), default=lambda part: part.decode() if isinstance(part, bytes) else str(part)
             )
-            here = next(_lines(found, (event,)))
-            yield f"{topic}: publication {number} is {here}, and was recorded as {there}"
+            yield f"{topic}: publication {number} is {next(_lines(found, (event,)))}, and was recorded as {there}"
         if len(wrong) > DIFFERENCES:
             yield f"{topic}: {len(wrong)} publications differ, of {each.said}; the last is {wrong[-1][0]}"
         if each.said != each.recorded:

@@ -79,8 +79,7 @@ class ReportingMonitor(Monitor):
         self._report(watched, before, self.events, self._now, None)
 
     def verdict(self, watched: Watched, values: Mapping[str, Value]) -> Fault | str | None:
-        margin = self._margin(watched, values)
-        self._cases.append(margin)
+        self._cases.append(self._margin(watched, values))
         return Monitor.verdict(self, watched, values)
 
     def judge_answer(self, asked: Asked, choices: Choices, found: list[Violation]) -> None:

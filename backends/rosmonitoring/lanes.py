@@ -90,8 +90,7 @@ def signals(
                 said = _said(read(recorded.event, None), sort, index)
             except MappingError:
                 continue  # it has a mark
-            columns = found.setdefault((setup.node.name, name), pictures.Columns(pictures.joined_stretches))
-            columns.put(index, said)
+            found.setdefault((setup.node.name, name), pictures.Columns(pictures.joined_stretches)).put(index, said)
     return Signals({key: pictures.runs(each.items()) for key, each in found.items()}, start, end, every)
 
 

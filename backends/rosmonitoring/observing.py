@@ -128,7 +128,7 @@ def _wires(
             message = at.known.messages[wire.item.name]
         found = [at.known.at(message, way) for way in paths]
     except NoField as error:
-        raise Wrong(str(error), "field" if "field" in entry else "fields") from None
+        raise Wrong(str(error), "field" if "field" in entry else "fields", hint=error.hint) from None
     sort = at.port.sort
     sorts = sort.items if isinstance(sort, s.TupleSort) and len(paths) > 1 else parts_of(sort)
     for way, (wire, holder), part in zip(paths, found, sorts, strict=True):
@@ -253,7 +253,7 @@ def _field(at: Observed, way: FieldPath, sort: s.Sort, *place: str | int) -> Wir
     try:
         wire, _ = at.known.at(at.message, way)
     except NoField as error:
-        raise Wrong(str(error), *place) from None
+        raise Wrong(str(error), *place, hint=error.hint) from None
     if isinstance(sort, s.DataSort):  # a word or a number that names the constructor
         usable = isinstance(wire, Scalar) and (wire.name in INTEGERS or wire.name in ("string", "wstring"))
     else:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
 from pathlib import Path
@@ -20,7 +20,7 @@ from avow.language.sorts import BOOL, BoolSort, FunctionSort, RealSort
 from avow.language.terms import Apply, Not, Quantified, Quantifier, Role, Term, Variable
 from avow.ros.bags import Event, Origin, is_bag, publisher
 from avow.ros.calls import CALL, part_topic
-from avow.ros.definitions import Definitions, Message, Wire
+from avow.ros.definitions import Definitions, Message, NoField, Wire
 from avow.ros.sources import definitions
 from avow.system.graph import dataflow
 from avow.system.plan import Edge, Located, System
@@ -96,6 +96,21 @@ class Setup:
     def kinds(self) -> dict[str, str]:
         """The types of the topics that are listened to (without their leading slash), as far as they are known."""
         return {same_topic(rule.topic): rule.kind for rule in self.carried.values() if rule.kind}
+
+    def unmarked(self, names: Collection[str]) -> str:
+        """Why the inputs and outputs among these variables cannot be paired by a field; empty if they can."""
+        answers, carried = self.answers, {name: rule for name, rule in self.carried.items() if name in names}
+        if answers is None or not set() < carried.keys() & self.heard < carried.keys():
+            return ""
+        for name, rule in carried.items():
+            way = answers.input if name in self.heard else answers.output
+            message = self.known.get(rule.kind)
+            try:
+                if way not in ((), (CALL,), (NUMBER,)) and message is not None and not self.known.missing(message):
+                    self.known.at(message, way)
+            except NoField as error:
+                return f"{error}, and answers are paired by {answers.by}: name the field (`input`, `output`), {_PAIR}"
+        return ""
 
     @property
     def heard(self) -> frozenset[str]:
@@ -219,7 +234,7 @@ class _Work:
             known = isinstance(rule, Fields | Choice) and of_latest(rule) and rule.initial is not None
             if known and name.startswith(f"{Role.INPUT}."):
                 text = f"by {by} it has no effect: an answer is judged with the message that it answered"
-                self.fault(text, name, "initial", hint="leave it out, or pair by `latency` or `arrival`")
+                self.fault(text, name, "initial", hint=f"leave it out, {_PAIR}")
         ends = ((p, observing.sources(self.system, self.node, p.name)) for p in self.node.inputs)
         looped = (
             p for p, found in ends if any(self.node.name in dataflow(self.system).upstream(s.node) for s in found)
@@ -457,6 +472,7 @@ class _Work:
         return FunctionValue({}, False) if _says_empty(term, edge.source.port) else None
 
 
+_PAIR = "or pair by `latency` or `arrival`"
 _FIELD_HINT = "name the field under `mapping`, for instance `in.x: pose.x`"
 
 

@@ -41,6 +41,7 @@ def at(event: Event, path: FieldPath) -> Any:
 def _within(message: Any, path: FieldPath) -> Any:
     place = message
     for depth, name in enumerate(path):
+        inside = place
         if isinstance(name, int):
             place = place[name] if isinstance(place, list) and -len(place) <= name < len(place) else _MISSING
         elif isinstance(place, Mapping) and name in place:
@@ -50,14 +51,15 @@ def _within(message: Any, path: FieldPath) -> Any:
         else:
             place = _MISSING
         if place is _MISSING:
-            raise MappingError(f"the message has no field {shown(path)}")
+            names = [key for key in inside if key not in ENVELOPE] if isinstance(inside, Mapping) else []
+            told = f"; {shown(path[:depth]) or 'it'} has {', '.join(names[:8])}" if names else ""
+            raise MappingError(f"the message has no field {shown(path)}{told}")
     return place
 
 
 def shown(path: FieldPath) -> str:
     """``pose.position.x``, ``ranges[0]``."""
-    text = "".join(f"[{step}]" if isinstance(step, int) else f".{step}" for step in path)
-    return text.removeprefix(".")
+    return "".join(f"[{step}]" if isinstance(step, int) else f".{step}" for step in path).removeprefix(".")
 
 
 _MISSING = object()

@@ -93,8 +93,7 @@ def _with_upstream(job: Job, found: Setup) -> list[Monitor]:
     monitors = [Monitor(found, None if job.node.name in names else [o.name for o in job.obligations])]
     for name in sorted(names - {job.node.name}):
         node = system.contract.node(name)
-        options = method_of(system, name)
-        other, faults = setup(system, node, options, found.known)
+        other, faults = setup(system, node, method_of(system, name), found.known)
         if not node.relay and not faults:
             monitors.append(Monitor(other))
     return monitors
@@ -228,8 +227,7 @@ def _breaks(found: Setup, violation: Violation) -> bool:
 
 def _judged(monitor: Monitor, name: str, seen: Iterable[Violation], unsaid: str) -> Judged:
     tally: Tally = monitor.tallies[name]
-    spoken = free_variables(monitor.setup.node.clause(name).formula)
-    outputs = {v.qualified for v in spoken if v.role is Role.OUTPUT}
+    outputs = {v.qualified for v in free_variables(monitor.setup.node.clause(name).formula) if v.role is Role.OUTPUT}
     first = next(
         (
             v

@@ -251,13 +251,12 @@ class Session:
             }
             name = monitor.setup.node.name
             nodes.append({"node": name, "relevant": monitor.relevant, "clauses": clauses, "topics": topics})
-        counts = {fault.name.lower(): count for fault, count in self.counts.items()}
         return {
             "system": self.system.name,
             "events": self.events,
             "clean": self.clean,
             "unmonitored": [*self.unmonitored()],
-            "faults": counts,
+            "faults": {fault.name.lower(): count for fault, count in self.counts.items()},
             "nodes": nodes,
             "listened": list(self.topics),
             "unknown_topics": dict(self.unheard),

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from avow.base.diagnostics import Diagnostic, Rejected, Span
+from avow.base.suggestions import nearby, nearest
 from avow.ros import bags
 from avow.ros.bags import NOWHERE, Carried, Event, Origin, is_bag
 
@@ -71,10 +72,13 @@ def event_of(line: str, name: str, number: int) -> Event | None:
         raise Rejected(_fault(name, number, error.colno, f"this is not JSON: {error.msg}")) from None
     except ValueError as error:
         raise Rejected(_fault(name, number, 1, str(error))) from None
-    if not isinstance(topic := event.get("topic"), str) or not topic:
-        raise Rejected(_fault(name, number, max(1, line.find('"topic"') + 1), "the event has no `topic`: a name"))
-    if wrong := _wrong_time(event):
-        raise Rejected(_fault(name, number, max(1, line.find('"time"') + 1), wrong))
+    topic = event.get("topic")
+    nameless = "" if isinstance(topic, str) and topic else "the event has no `topic`: a name"
+    for key, wrong in (("topic", nameless), ("time", _wrong_time(event))):
+        if wrong:
+            meant = next(iter([] if key in event else nearest(key, event)), key)
+            hint = f"`{meant}`: did you mean `{key}`?" if meant != key else None
+            raise Rejected(_fault(name, number, line.find(json.dumps(meant)) + 1 or 1, wrong, hint))
     return event
 
 
@@ -115,7 +119,12 @@ def read_trace(
     except UnicodeDecodeError:
         raise _not_text(str(path)) from None
     except OSError as error:
-        raise Rejected(Diagnostic("MON201", f"cannot read {path}: {error.strerror or error}")) from None
+        raise unread(path, error) from None
+
+
+def unread(path: Path, error: OSError) -> Rejected:
+    """The error for a trace that cannot be read."""
+    return Rejected(Diagnostic("MON201", f"cannot read {path}: {error.strerror or error}", hint=nearby(path)))
 
 
 def parsed(chunk: bytes, name: str, before: int) -> tuple[list[Event], Sequence[int], int, Rejected | None]:
@@ -202,5 +211,5 @@ def opened() -> Iterator[None]:
         raise Rejected(Diagnostic("MON203", str(wrong), hint=wrong.hint)) from None
 
 
-def _fault(name: str, line: int, column: int, message: str) -> Diagnostic:
-    return Diagnostic("MON204", message, Span(name, line, column, line, column + 1))
+def _fault(name: str, line: int, column: int, message: str, hint: str | None = None) -> Diagnostic:
+    return Diagnostic("MON204", message, Span(name, line, column, line, column + 1), hint=hint)

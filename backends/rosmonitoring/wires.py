@@ -235,6 +235,7 @@ def taken(take: Take, sort: s.Sort, wire: Array, known: Definitions, gaps: froze
         length = wire.length
         as_real = isinstance(sort, s.RealSort)
         return lambda raw: whole(len(_items(raw, length))) if as_real else len(_items(raw, length))
+
     part = converter(sort if take is not Take.COUNT else _REAL, wire.item, {}, known, gaps)
 
     def read(raw: Any) -> Value:
@@ -286,8 +287,7 @@ def _float(raw: Any, *, wide: bool, gaps: frozenset[Gap]) -> Fraction:
 @functools.lru_cache(maxsize=65536)
 def _of_text(text: str, wide: bool) -> Fraction:
     try:
-        value = Fraction(exact(text.encode()))
-        return of_type(value, Scalar("float64" if wide else "float32"))
+        return of_type(Fraction(exact(text.encode())), Scalar("float64" if wide else "float32"))
     except (NotANumber, OverflowError):
         raise MappingError(f"{text[:60]} is not a number of this type") from None
 

@@ -451,6 +451,7 @@ def test_a_predicate_is_judged_by_what_it_means_in_columns(
         ("run,v,e\n1,5,2\n", 1, "no column 'd'"),
         ("run,v,d,d\n1,5,2,2\n", 1, "twice"),
         ("v,d\n5,2\n", 1, "no column identifies a run"),
+        ("runn,v,d\n1,5,2\n", 1, "no column identifies a run (`runn`: did you mean `run`?"),
         ("run,v,d\n1,5,nan\n", 2, "not a number"),
         ("run,v,d\n1,5,2\n2,5,inf\n", 3, "not a number"),
         ("run,v,d\n1,5,\n", 2, "an empty cell"),
@@ -474,7 +475,7 @@ def test_a_predicate_is_judged_by_what_it_means_in_columns(
 )
 def test_bad_data_is_told_with_its_line_and_never_green(tmp_path: Path, text: str, line: int, word: str) -> None:
     asked = job(tmp_path, BRAKES, text, **BRAKING)
-    found = [d for d in BACKEND.check(asked) if word in d.message]
+    found = [d for d in BACKEND.check(asked) if word in f"{d.message} ({d.hint})"]
     assert [d.span.line for d in found if d.span] == [line], BACKEND.check(asked)
     outcome = settle(asked)
     assert outcome.verdict is Verdict.ERROR

@@ -18,6 +18,8 @@ from oracle.rosmonitoring import problems
 
 from avow.backend_kit.protocol import Backend, Limits
 from avow.backends.rosmonitoring import BACKEND
+from avow.backends.rosmonitoring.traces import read_trace
+from avow.base.diagnostics import Rejected, Severity
 from avow.base.verdict import Outcome, Verdict
 from avow.system.load import load_system
 from avow.system.plan import System
@@ -177,6 +179,36 @@ def test_a_trace_outside_the_system_is_a_fault(make_system: Callable[..., System
     for name in ("../secret.jsonl", "/etc/passwd", "absent.jsonl"):
         faults = BACKEND.check(job_for(make_system(SYSTEM, traces=[name]), "n"))
         assert any(d.code == "MON102" and d.span is not None for d in faults)
+
+
+def test_a_slip_in_the_name_of_a_trace_is_told_with_the_name_that_is_there(make_system: Callable[..., System]) -> None:
+    """By a digest too, though such a recording may be missing."""
+    for entry, severity in (
+        ("runn.jsonl", Severity.ERROR),
+        ({"path": "runn.jsonl", "sha256": "0" * 64}, Severity.WARNING),
+    ):
+        system = make_system(MONITOR, {"out.v": "data"}, traces=[entry])
+        (system.plan.root / "run.jsonl").touch()
+        (fault,) = (d for d in BACKEND.check(job_for(system, "n")) if d.code == "MON102")
+        assert (fault.severity, fault.hint) == (severity, "did you mean `run.jsonl`?")
+    with pytest.raises(Rejected, match="cannot read") as found:
+        list(read_trace(system.plan.root / "rn.jsonl"))
+    assert found.value.diagnostics[0].hint == "did you mean `run.jsonl`?"
+
+
+@pytest.mark.parametrize(("traces", "told"), [([], True), (["by_hand.jsonl"], False)])
+def test_a_message_without_the_field_that_pairs_answers_is_told(
+    make_system: Callable[..., System], traces: list[str], told: bool
+) -> None:
+    """A line of JSON may have other fields than its type; a bag's message has not."""
+    paired = "node n {{ inputs( a : REAL ) outputs( b : REAL ) topics( {} t matches(in.a), {} u matches(out.b) ) {} }}"
+    for kind, said in (("std_msgs/Float64", told), ("sensor_msgs/Temperature", False)):
+        text = paired.format("sensor_msgs/Temperature", kind, "guarantee g ( out.b >= in.a )")
+        fields = {"in.a": "temperature", "out.b": "data" if said or "std" in kind else "temperature"}
+        more = {"ros": {"distro": "humble"}}
+        system = make_system(text, fields, plan=more, traces=traces, answers={"by": "stamp"})
+        found = [d for d in BACKEND.check(job_for(system, "n")) if d.code == "MON103"]
+        assert ["std_msgs/Float64 has no field 'header'" in d.message for d in found] == [True] * said
 
 
 MONITOR = """

@@ -107,6 +107,8 @@ def test_headers_are_never_meant(make_system: Callable[..., System]) -> None:
         ("NATURAL", "x", "float64 x", "x is float64, which cannot be read as NATURAL"),
         ("REAL", "x", "string x", "x is string, which cannot be read as REAL"),
         ("REAL", "y", "float64 x", "has no field 'y'; it has x"),
+        ("REAL", "distence", "float64 distance", "has no field 'distence'; it has distance (did you mean `distance`?)"),
+        ("REAL", "yaw", "float64 x", "(a/Turn has such a field)"),
         ("REAL", "x.y", "float64 x", "x (float64) has no fields"),
         ("REAL", "x[3]", "float64[3] x", "x has 3 items"),
         ("REAL", {"field": "x", "take": "min"}, "float64 x", "x is float64, and no array"),
@@ -122,8 +124,8 @@ def test_headers_are_never_meant(make_system: Callable[..., System]) -> None:
 def test_wrong_paths_and_types_are_faults_of_the_plan(
     make_system: Callable[..., System], sort: str, entry: Any, definition: str, words: str
 ) -> None:
-    _, faults = told(system_of(make_system, sort, "a/V", entry, messages={"a/V": definition}))
-    assert [words in d.message for d in faults] == [True], faults
+    _, faults = told(system_of(make_system, sort, "a/V", entry, messages={"a/V": definition, "a/Turn": "float64 yaw"}))
+    assert [words in f"{d.message} ({d.hint})" for d in faults] == [True], faults
 
 
 @pytest.mark.parametrize(

@@ -33,6 +33,8 @@ def test_lines_are_counted_with_blank_ones() -> None:
         ('{"topic": "a", "time": null}\n', 1, 16, "no `time`"),
         ('{"topic": "a", "time": "12.5"}\n', 1, 16, 'no number of seconds: "12.5"'),
         ('{"time": 1, "data": 5}\n', 1, 1, "no `topic`"),
+        ('{"time": 1, "tpoic": "a"}\n', 1, 13, "no `topic`: a name (`tpoic`: did you mean `topic`?)"),
+        ('{"topic": "a", "tiem": 1}\n', 1, 16, "(`tiem`: did you mean `time`?)"),
         ('{"time": 1, "topic": 5}\n', 1, 13, "no `topic`"),
         ('{"Topic": "a", "topic": null, "time": 1}\n', 1, 16, "no `topic`"),
         ('{"time": true, "topic": "a"}\n', 1, 2, "no number of seconds"),
@@ -52,7 +54,7 @@ def test_malformed_lines_are_located(tmp_path: Path, text: str, line: int, colum
     (fault,) = error.value.diagnostics
     assert fault.span is not None
     assert (fault.span.line, fault.span.column) == (line, column)
-    assert words in fault.message
+    assert words in (f"{fault.message} ({fault.hint})" if fault.hint else fault.message)
 
 
 @pytest.mark.parametrize("time", ["0", "-0.0", "12", "1763766000.123456789", "1.5e3", "0." + "1" * 50])

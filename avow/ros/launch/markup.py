@@ -59,8 +59,7 @@ def from_yaml(text: str, file: str) -> Parsed:
     if top is None:
         raise WrongLaunch("a launch file in YAML begins with `launch:`", 1)
     work = _Yaml(file)
-    found = work.listed(top, 0)
-    return Parsed(tuple(found), work.parsed.unread)
+    return Parsed(tuple(work.listed(top, 0)), work.parsed.unread)
 
 
 class _Yaml:

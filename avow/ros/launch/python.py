@@ -69,8 +69,7 @@ actions; empty: it is not read."""
 def from_python(text: str, file: str) -> Parsed:
     """Raises WrongLaunch."""
     try:
-        module = ast.parse(text)
-        return _Python(file, module).parsed()
+        return _Python(file, ast.parse(text)).parsed()
     except SyntaxError as error:
         raise WrongLaunch(f"this is not Python: {error.msg}", error.lineno or 1) from None
     except (RecursionError, ValueError, MemoryError):

@@ -41,8 +41,7 @@ def follow(
         try:
             file = stack.enter_context(record.open("w", encoding="utf-8")) if record is not None else None
         except OSError as error:
-            text = f"{record} cannot be written: {error.strerror}"
-            raise Rejected(Diagnostic("MON304", text)) from None
+            raise Rejected(Diagnostic("MON304", f"{record} cannot be written: {error.strerror}")) from None
         stack.enter_context(graph)
         if unsure := [m.setup.node.name for m in running.monitors if m.by_arrival and m.setup.heard]:
             warn(UNORDERED.format(float(LIVE_APART), ", ".join(unsure)))

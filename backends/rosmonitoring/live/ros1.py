@@ -210,8 +210,7 @@ class Ros1:
         if code != 1 or not isinstance(protocol, list) or len(protocol) != 3:
             raise ConnectionError(f"it does not speak TCPROS: {text}")
         with socket.create_connection((str(protocol[1]), int(protocol[2])), timeout=PUBLISHER_SECONDS) as line:
-            wanted = {"callerid": CALLER, "topic": topic, "type": "*", "md5sum": "*", "tcp_nodelay": "1"}
-            line.sendall(header(wanted))
+            line.sendall(header({"callerid": CALLER, "topic": topic, "type": "*", "md5sum": "*", "tcp_nodelay": "1"}))
             fields = read_header(line)
             line.settimeout(None)  # from now on it may be silent
             read = reader(topic, fields)

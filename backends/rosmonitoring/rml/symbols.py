@@ -100,8 +100,7 @@ def field_cases(path: FieldPath, sort: Sort, name: str, names: Mapping[str, str]
                 Case(((path, word),), (Number(Fraction(number)),), ()) for word, number in (("false", 0), ("true", 1))
             ]
         case NaturalSort():
-            guard = compare(">=", Name(name), Number(Fraction(0)))
-            return [Case(((path, name),), (Name(name),), (name,), guard)]
+            return [Case(((path, name),), (Name(name),), (name,), compare(">=", Name(name), Number(Fraction(0))))]
         case RealSort() | IntegerSort():
             return [Case(((path, name),), (Name(name),), (name,))]
         case _:
@@ -201,8 +200,7 @@ Symbol = Scalar | Variant | Points | Tracked | Table
 
 def code(sort: s.EnumSort | s.DataSort, name: str) -> int:
     """The number that represents an element or a constructor; 0 represents none."""
-    names = sort.members if isinstance(sort, s.EnumSort) else tuple(c.name for c in sort.constructors)
-    return names.index(name) + 1
+    return (sort.members if isinstance(sort, s.EnumSort) else tuple(c.name for c in sort.constructors)).index(name) + 1
 
 
 def constant(value: Value, sort: s.Sort) -> Symbol:
@@ -306,8 +304,7 @@ def equal(left: Symbol, right: Symbol) -> Condition:
             cases = []
             for at, (mine, theirs) in enumerate(zip(left.arguments, right.arguments, strict=True), start=1):
                 other_tag = compare("!=", left.tag, Number(Fraction(at)))
-                parts = every([equal(a, b) for a, b in zip(mine, theirs, strict=True)])
-                cases.append(some([other_tag, parts]))
+                cases.append(some([other_tag, every([equal(a, b) for a, b in zip(mine, theirs, strict=True)])]))
             return every([same, *cases])
         case _:
             raise NotRml("an equation between relations")

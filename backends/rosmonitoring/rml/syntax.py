@@ -155,8 +155,7 @@ def without_exclusions(condition: Condition, name: Name) -> Condition | None:
             return condition if name.name not in names_in(condition) else None
         case Every(items=items) | Some(items=items):
             found = [part for item in items if (part := without_exclusions(item, name)) is not None]
-            joined_up = every if isinstance(condition, Every) else some
-            return joined_up(found) if len(found) == len(items) else None
+            return (every if isinstance(condition, Every) else some)(found) if len(found) == len(items) else None
 
 
 def _slope(number: Numeric, name: Name) -> int | None:
