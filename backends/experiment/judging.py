@@ -14,14 +14,27 @@ from avow.formulas.conditions import Condition, conditions
 from avow.formulas.formula import conjunction, free_variables, negation, substitute
 from avow.formulas.temporal.cell import Cell
 from avow.formulas.temporal.cells import Records
-from avow.formulas.temporal.responses import due
+from avow.formulas.temporal.responses import due, pending, responding
 from avow.formulas.traversal import transform
 from avow.formulas.values import Value
 from avow.language.contract import Clause
 from avow.language.printer import show_term
 from avow.language.sorts import BOOL, FunctionSort
 from avow.language.subterms import histories, ports_of, subterms
-from avow.language.terms import TRUE, And, Conditional, Implies, Not, Or, Quantified, Quantifier, Role, Term, Variable
+from avow.language.terms import (
+    TRUE,
+    And,
+    Conditional,
+    Implies,
+    Not,
+    Or,
+    Past,
+    Quantified,
+    Quantifier,
+    Role,
+    Term,
+    Variable,
+)
 from avow.solving.questions import solve
 
 from .binding import Interpretation, interpreted
@@ -49,6 +62,8 @@ class Claim:
     """The ports and columns that have values and are read."""
     remembers: bool
     cells: tuple[Cell, ...]
+    waits: Formula | None
+    """A response whose time is not over is missing; None if the guarantee is no response with a limit."""
     interpreted: tuple[str, ...]
     """The texts of the interpretations that it, or an assumption, needs."""
 
@@ -56,12 +71,13 @@ class Claim:
 @dataclass(frozen=True, slots=True)
 class Judged:
     """The result of a trial. `met`: the indices of the conditions that were met; `asked`: the guarantee demanded
-    something; `broken`: the step that violates it; `excused`: an assumption did not hold, before any violation;
-    `undecided`: the name of what could not be decided."""
+    something; `broken`: the step that violates it; `open`: it ends before an answer is due; `excused`: an assumption
+    did not hold, before any violation; `undecided`: the name of what could not be decided."""
 
     met: frozenset[int] = frozenset()
     asked: bool = False
     broken: int | None = None
+    open: bool = False
     excused: bool = False
     undecided: str = ""
 
@@ -77,8 +93,10 @@ def claim(clause: Clause, assumptions: Iterable[Clause], meanings: Iterable[Inte
     formulas = (clause.formula, *(each.formula for each in assumptions))
     formula = interpreted(clause.formula, known_meanings)
     assumed = {each.name: interpreted(each.formula, known_meanings) for each in assumptions}
+    waiting = pending(formula) if (found := responding(formula)) and found[2].operator is not Past.UNTIL else None
     unseen = [name for name, term in assumed.items() if not _ports(term) <= known]
     judged_terms = (formula, *(term for name, term in assumed.items() if name not in unseen))
+    waits = None if waiting is None else Formula.made(clause.name, records.term(waiting))
     return Claim(
         ready(clause.name, formula),
         tuple(ready(_named(condition, formula), condition) for condition in _conditions(formula, assumed)),
@@ -89,13 +107,14 @@ def claim(clause: Clause, assumptions: Iterable[Clause], meanings: Iterable[Inte
         frozenset(name for term in judged_terms for name in _ports(term) & known),
         any(histories(term) for term in judged_terms),
         tuple(records.cells),
+        waits,
         tuple(one.text for one in known_meanings if any(interpreted(each, [one]) != each for each in formulas)),
     )
 
 
 def judged(claim: Claim, steps: Sequence[Step]) -> Judged:
     """One trial, from its first step."""
-    keeper, met, asked, doubt, undecided = Keeper(claim.cells), set[int](), False, "", ""
+    keeper, met, asked, waits, doubt, undecided = Keeper(claim.cells), set[int](), False, False, "", ""
     for at, ports in enumerate(steps):
         values = keeper.at(ports)
         assumed = {formula.name: formula.holds(values) for formula in claim.assumptions}
@@ -109,8 +128,9 @@ def judged(claim: Claim, steps: Sequence[Step]) -> Judged:
         if held is False:
             return Judged(frozenset(met), True, broken=at, undecided=doubt)
         undecided = undecided or (claim.holds.name if held is None else "")
+        waits = claim.waits is not None and claim.waits.holds(values) is not False
         keeper.advance(ports)
-    return Judged(frozenset(met), asked, undecided=doubt or undecided)
+    return Judged(frozenset(met), asked, open=waits, undecided=doubt or undecided)
 
 
 def _demands(formula: Term) -> Evaluator | None:

@@ -60,6 +60,8 @@ def _outcome(claim: Claim, found: Sequence[tuple[Run, Judged]], experiment: Expe
     bound: dict[str, object] = {"runs": len(found), "confidence": float(experiment.confidence)}
     if sample.excused:
         bound["runs that break an assumption"] = sample.excused
+    if unfinished := [run.name for run, one in found if one.open]:
+        bound["runs that end before an answer is due"] = len(unfinished)
     outcome = Outcome("", Verdict.UNKNOWN, "", bound=bound, details=details)
     details["strata"] = [_row(stratum) for stratum in sample.strata]
     bound["triggered"], bound["failures"] = sample.triggered, len(sample.failed)
@@ -85,6 +87,9 @@ def _outcome(claim: Claim, found: Sequence[tuple[Run, Judged]], experiment: Expe
     rests = ["the runs are independent and drawn as the robot will be used", *claim.interpreted]
     if claim.unseen:
         rests.append(f"each run meets the assumptions {', '.join(claim.unseen)}: their inputs are not in the data")
+    if unfinished:
+        names = listed(unfinished, FAILURES_SHOWN)
+        rests.append(f"no answer would be late in runs that end before one is due: {names}")
     if sample.failed:
         details["failing runs"] = _counterexample(claim, sample.failed).explanation
         rests.append(f"the guarantee is meant statistically: in at least {_percent(asked)} of runs")
@@ -182,6 +187,8 @@ def _word(claim: Claim, one: Judged) -> str:
         return "failed"
     if one.undecided:
         return "undecided"
+    if one.open:
+        return "ends before an answer is due"
     return "ok" if (one.met if claim.conditions else one.asked) else "not triggered"
 
 
