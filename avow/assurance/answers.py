@@ -90,7 +90,7 @@ ABOUT = {
     Sort.PLATFORM: "about the platform",
     Sort.MODELS: "about models",
     Sort.SAMPLING: "about samples",
-    Sort.MEANING: "about requirements' meaning",
+    Sort.MEANING: "about meaning",
     Sort.TOOLS: "about trusted tools",
 }
 """The topic of each sort of assumption, after a count: ``2 about the world``."""
@@ -212,7 +212,7 @@ class NodeBasis:
 
 @dataclass(frozen=True, slots=True)
 class SupposedLine:
-    """One line for all assumptions of a sort: their number, and the most needed one."""
+    """One line for all assumptions of a sort: their number, and one of them in words."""
 
     sort: Sort
     count: int

@@ -183,7 +183,7 @@ def conclude(facts: Facts) -> Case:
         changed,
         weakest,
         following,
-        trust_lines(proofs, facts.kernel, supposed, facts.run.id),
+        trust_lines(proofs, facts.kernel, supposed, views, facts.run.id),
         strict=facts.expected is not None,
         passed=code == 0,
     )

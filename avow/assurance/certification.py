@@ -93,7 +93,7 @@ def _graded(view: ObligationView, known: Reestablished | None) -> ProofView:
     others = [e for e in proofs if e.backend != CALCULUS]
     if own and not others:
         return ProofView(view.id, ProofGrade.CLAIMED, tuple(sorted({f"{e.tool} {e.tool_version}" for e in own})))
-    tools = {f"{e.backend}: {e.tool} {e.tool_version}".strip() for e in others}
+    tools = {e.tool_told if e.tool_told.startswith(e.backend) else f"{e.backend}: {e.tool_told}" for e in others}
     tools |= set() if tools else {f"{r.backend}: another claim's proof" for r in view.records}
     return ProofView(view.id, ProofGrade.TOOL_TRUSTED, tuple(sorted(tools)))
 

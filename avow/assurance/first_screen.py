@@ -43,11 +43,13 @@ from avow.assurance.summary import refutation
 from avow.base.plain import count, listed
 from avow.evidence.obligation import SYSTEM_LEVEL, Kind
 from avow.evidence.status import Status
+from avow.system.statements import GENERAL
 
 ROWS, WORST, NODES, SQUARES, LINES, OWNERS, REASON = 6, 3, 8, 12, 5, 3, 72
 """The most requirements that have a row each; else the number of the worst, and of refutations; nodes; squares for a
 node; changes; owners; characters of a counterexample."""
 _FELLED = (Kind.GUARANTEE, Kind.REQUIREMENT, Kind.COMPOSITION, Kind.PROGRAM, Kind.SANITY, Kind.WELL_FORMED)
+_WRONG = (Status.REFUTED, Status.CONTRADICTORY)
 _WORST_FIRST = tuple(reversed(Level))
 _rank = attrgetter("rank")
 
@@ -222,6 +224,8 @@ def _basis(
         by_object.setdefault(_examined(view, relied, views), Counter())[said] += 1
     counted = {what: ", ".join(f"{many} {said}" for said, many in of.items()) for what, of in by_object.items()}
     words = "; ".join(" ".join((many, what)).strip() for what, many in counted.items()) or "no guarantees"
+    wrong = {v.obligation.kind is Kind.PROGRAM for v in views if v not in own and v.status in _WRONG and not v.advice}
+    words += "".join(f"; {'program' if of_program else 'contract'} refuted" for of_program in sorted(wrong))
     squares = tuple((LETTERS.get(said, "✘"), tone) for (said, tone), _ in marks)
     worst = min((tone.rank for _, tone in squares), default=Tone.GREEN.rank)
     share = sum(tone.rank == worst for _, tone in squares) / max(1, len(squares))
@@ -260,7 +264,7 @@ def _refuted(
 ) -> str:
     """The refutations with their counterexamples, and the requirements that do not hold: one for each node and one for
     the whole system, a guarantee before the claims that rest on it. Empty if nothing is refuted."""
-    wrong = [v for v in views if v.status in (Status.REFUTED, Status.CONTRADICTORY) and not v.advice]
+    wrong = [v for v in views if v.status in _WRONG and not v.advice]
     if not wrong:
         return ""
     titles = {node.name: node.title for node in nodes}
@@ -287,9 +291,15 @@ def _lines(assumptions: Sequence[Assumption]) -> Iterable[SupposedLine]:
     for sort in Sort:
         of_sort = [s for s in assumptions if s.sort is sort]
         if of_sort:
-            most = max(of_sort, key=lambda s: (s.expired, bool(s.says), len(s.needed_by)))
+            most = max(of_sort, key=lambda s: (s.expired, bool(s.says), _ideal(s), len(s.needed_by)))
             others = tuple(s.number for s in of_sort if s is not most)
             yield SupposedLine(sort, len(of_sort), most.words, most.number, others)
+
+
+def _ideal(assumption: Assumption) -> int:
+    """Ranks what a model leaves out (a reaction takes no time) before what a plan adds: its reader is the last to think
+    of it."""
+    return list(GENERAL).index(assumption.key) if assumption.general else -1
 
 
 def _owners(assumptions: Sequence[Assumption]) -> str:

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 LEAST_CONFIDENCE = Fraction(9, 10)
 """Below it, a rate is no evidence that a policy's limit is met."""
 
-NO_RATE = "no failure rate"
+NO_RATE = "no overall failure rate"
 _SAMPLED = (Status.TESTED, Status.MONITORED)
 
 _TRIALS = {
@@ -65,7 +65,7 @@ class RateView:
     def words(self) -> str:
         """One line, without a full stop."""
         if not self.bound:
-            return f"failure rate: none can be given: {self.why}"
+            return f"failure rate of the requirement: none, as {self.why}"
         if Fraction(self.bound) >= 1:
             return f"failure rate: none below 100 % is shown by {count(len(self.leaves), 'sampled claim')} together"
         if len(self.leaves) < 2:
@@ -99,7 +99,8 @@ def rate_of(own: Iterable[str], claims: Iterable[str], views: Mapping[str, Oblig
     proof = next((found for name in own for record in views[name].records if (found := _composes(record))), None)
     why = ""
     if unrated:
-        why = f"shown by tests without a rate: {listed([short(name) for name in unrated], 3)}"
+        names = listed([short(name) for name in unrated], 3)
+        why = f"only experiments count trials of the robot's use, and none counts for {names}"
     elif proof is None:
         why = "no proof of a formula composes one from the samples"
     elif beyond := [short(leaf.claim) for leaf in leaves if short(leaf.claim) in proof.beyond]:

@@ -92,7 +92,7 @@ def open_items(
             reason=said.get(view.id, ""),
         )
         for view in views
-        if view.advice and view.status is Status.REFUTED
+        if view.advice and view.status in (Status.REFUTED, Status.UNKNOWN, Status.ERROR)
     ]
     return tuple(items)
 

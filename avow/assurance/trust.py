@@ -6,12 +6,21 @@ from collections import Counter
 from collections.abc import Sequence
 
 from avow.assurance.answers import Assumption, TrustLine
-from avow.assurance.certification import KernelRun, ProofGrade, ProofView, certifiable
+from avow.assurance.certification import CALCULUS, KernelRun, ProofGrade, ProofView, certifiable
+from avow.assurance.model import ObligationView
 from avow.base.plain import count, listed
+from avow.evidence.record import Evidence
+from avow.evidence.status import Status, weigh
+
+_SAMPLED = (Status.CHECKED, Status.TESTED, Status.MONITORED)
 
 
 def trust_lines(
-    proofs: Sequence[ProofView], kernel: KernelRun, assumptions: Sequence[Assumption], run: str
+    proofs: Sequence[ProofView],
+    kernel: KernelRun,
+    assumptions: Sequence[Assumption],
+    views: Sequence[ObligationView],
+    run: str,
 ) -> tuple[TrustLine, ...]:
     """The kernel, the solvers, the front end, tools whose answers are trusted, and assumptions without an owner."""
     wanted = certifiable(proofs)
@@ -37,13 +46,18 @@ def trust_lines(
         second = several if len(kernel.solvers) > 1 else "no second solver"
         lines.append(TrustLine("solvers", names, second, twice < len(certified) or not twice))
     tools = Counter(tool for proof in proofs for tool in proof.tools)
+    tools.update(_named(r) for v in views for r in v.records if weigh(r).support in _SAMPLED)
     if tools:
-        names = listed([f"{tool} ({many})" for tool, many in sorted(tools.items())], 4)
+        names = listed([f"{tool} ({many})" for tool, many in sorted(tools.items())], 9)
         lines.append(
-            TrustLine("tools whose proofs have no certificate", names, "their backends are tested with seeded faults")
+            TrustLine("tools whose answers have no certificate", names, "their backends are tested with seeded faults")
         )
     bare = [a for a in assumptions if not a.owned]
     if bare:
         numbers = listed([a.number for a in bare], 6)
         lines.append(TrustLine("assumptions without an owner", numbers, "nobody keeps them true", True))
     return tuple(lines)
+
+
+def _named(record: Evidence) -> str:
+    return f"search by {record.tool_told}" if record.backend == CALCULUS else record.tool_told

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections import Counter
 from collections.abc import Iterator
 from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
 from fractions import Fraction
@@ -15,18 +16,9 @@ _SUPPORTS = ("proved", "checked", "tested", "monitored", "reviewed", "justified"
 """Best first."""
 _STRICT = 1 - 1e-5
 """Bounds in records are decimals of six digits: so far may one lie below what the sample gives."""
-_QUOTED: tuple[str, ...] = (
-    "assumptions",
-    "baseline",
-    "changes",
-    "digests",
-    "environment",
-    "hazards",
-    "ledger_head",
-    "nodes",
-    "policy",
-)
-_QUOTED += ("run", "standard", "statements", "system", "title", "today", "tools", "methods", "sources")
+_QUOTED: tuple[str, ...] = ("assumptions", "baseline", "changes", "digests", "environment", "hazards")
+_QUOTED += ("nodes", "policy", "run", "standard", "statements", "system", "title", "today", "tools", "methods")
+_QUOTED += ("ledger_head", "sources")
 
 
 class Facts:
@@ -59,7 +51,7 @@ class Facts:
             for told in map(_refuting, records(v)):
                 yield from (told, told[:71].rstrip() + "…")
         yield from (f"{name} {version}" for name, version in self.case["kernel"]["solvers"].items())
-        yield from (p for proof in self.case["proofs"] for p in proof.get("tools") or ())
+        yield from self.tools()
         for gate in self.case["gates"]:
             yield from (gate["title"], *gate["reason"].split("; "), gate["reason"][:199].rstrip() + "…")
             yield from (re.sub("`([^`]+)`", r"\1", s["text"]) for s in gate["suggestions"])
@@ -105,8 +97,12 @@ class Facts:
         asked = [p for p in self.case["proofs"] if p["obligation"].split("/")[2] in ("composition", "requirement")]
         return sum(not grades or p["grade"] in grades for p in asked)
 
-    def proved_by(self, tool: str) -> int:
-        return sum((p.get("tools") or ()).count(tool) for p in self.case["proofs"])
+    def tools(self) -> Counter[str]:
+        """How many answers without a certificate each tool has: proofs, searches, tests and observations."""
+        found = Counter(tool for p in self.case["proofs"] for tool in p.get("tools") or ())
+        sampled = ("checked", "tested", "monitored")
+        found.update(_tool(r) for v in self.views for r in records(v) if support(r) in sampled)
+        return found
 
     def stands(self, node: str, status: str, what: str) -> tuple[int, int]:
         """At least and at most so many guarantees of a node stand so, by evidence of such an object (any: ``-``)."""
@@ -217,6 +213,12 @@ def support(record: Json) -> str:
 def _way(record: Json) -> tuple[str, str]:
     said = support(record)
     return said, record["of"] if said in ("proved", "checked", "tested", "monitored") else ""
+
+
+def _tool(record: Json) -> str:
+    tool, version = record["tool"], record["tool_version"]
+    told = version if tool and version.casefold().startswith(tool.casefold()) else f"{tool} {version}".strip()
+    return f"search by {told}" if record["backend"] == "compose" else told
 
 
 def _sampled(stratum: Json) -> bool:

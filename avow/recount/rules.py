@@ -20,7 +20,7 @@ _SORTS = {
     "the platform": "the platform",
     "models": "models",
     "samples": "sampling",
-    "requirements' meaning": "meaning",
+    "meaning": "meaning",
     "trusted tools": "tools",
 }
 _DEFICITS = {
@@ -137,6 +137,12 @@ def _hazard(facts: Facts, match: re.Match[str], _block: Block) -> _Numbers:
         return None
     least = [m["name"] for m in hazard["mitigations"] if m["level"] == hazard["level"]]
     return hazard["hazard"]["id"], match[2], least[0], ", ".join(hazard["hazard"]["mitigated_by"])
+
+
+def _dangers(facts: Facts, match: re.Match[str], _block: Block) -> _Numbers:
+    """The hazards of a level, with their severities, and how many are not named."""
+    names = [f"{h['hazard']['id']} ({h['hazard']['severity']})" for h in facts.hazards if h["level"] == match[1]]
+    return match[1], ", ".join(" ".join(n.split()) for n in names[:6]), str(len(names) - 6) if names[6:] else None
 
 
 def _seen(facts: Facts, match: re.Match[str], block: Block) -> _Numbers:
@@ -260,6 +266,8 @@ RULES = (
     _rule("head", rf"(\d+) ({_LEVELS})(?= [·␟]|, | $)", _level),
     _rule("q1", rf"^ ␟ (\d+) ({_LEVELS}) ␟ (.*?) $", _named),
     _rule("q1", r"^ (␟ .* ␟ )(\d+) $", _row),
+    _rule("q1", r"(\d+) more in words", _whole(lambda f: len(f.requirements) - 3)),
+    _rule("q1", rf"({_LEVELS}) ((?:[^();]* \([^()]*\),?)+)(?: and (\d+) more)?(?=[;.])", _dangers),
     _rule("q2", rf"(\d+) ({_STATUS})\b", _basis),
     _rule("q2", r"and (\d+) nodes? on no less", _whole(lambda f: len(f.case["nodes"]) - 8)),
     _rule("q3", r"and (\d+) more claims?", _whole(lambda f: len(f.wrong()) - min(3, f.wronged()))),
@@ -289,7 +297,8 @@ RULES = (
         r"(\d+) of (\d+) answered by two solvers",
         lambda f, _m, _b: (str(f.proofs("certified-2")), str(f.proofs("certified-1", "certified-2"))),
     ),
-    _rule("q7", r"(?:[(,] ?)([^(),]+) \((\d+)\)", lambda f, m, _b: (m[1], str(f.proved_by(m[1].strip())))),
+    _rule("q7", r"(?:[(,] ?)([^(),]+) \((\d+)\)", lambda f, m, _b: (m[1], str(f.tools()[m[1].strip()]))),
+    _rule("q7", r"\) and (\d+) more\)", _whole(lambda f: len(f.tools()) - 9)),
     _rule("q7", r"without an owner \((.*?)(?: and (\d+) more)?\)", _bare),
     _rule("signature", r"assumptions (A\d+ to A\d+)", lambda f, _m, _b: (f"A1 to A{len(f.assumptions)}",)),
     _rule("signature", r"assumption A(\d+)\b", _whole(lambda f: len(f.assumptions))),

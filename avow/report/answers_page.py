@@ -14,7 +14,6 @@ from avow.assurance.answers import MEANINGS, Assumption, Level, NodeBasis, Suppo
 from avow.assurance.changes import baseline_of
 from avow.assurance.first_screen import basis_of
 from avow.assurance.model import Case, ObligationView
-from avow.assurance.modules import NodeModule, RequirementModule, node_modules, requirement_modules
 from avow.assurance.relied import kept_apart, shade
 from avow.base.plain import count, listed
 from avow.base.tuning.shown import NODE_BOXES, SHEET_LETTERS
@@ -22,6 +21,7 @@ from avow.evidence.record import Evidence
 from avow.evidence.status import Status, weigh
 from avow.report import wording
 from avow.report.bowtie import bowtie
+from avow.report.modules import NodeModule, RequirementModule, node_modules, requirement_modules
 from avow.report.page import asset, environment, known_pages, svg_image
 
 _ORDER = (Tone.RED, Tone.AMBER, Tone.GREEN, Tone.GREY)
@@ -44,6 +44,9 @@ def render_answers(case: Case, json_digest: str = "") -> str:
         json_digest,
         bowtie=lambda view: svg_image(bowtie(view)),
         brief=wording.gate_line,
+        dangers=wording.dangers(case),
+        no_hazard=wording.NO_HAZARD,
+        weakest=wording.weakest,
         by_level=by_level,
         content=baseline_of(case).content,
         listed=case.listed,

@@ -10,7 +10,6 @@ from collections.abc import Iterable, Iterator
 from avow.assurance import answers
 from avow.assurance.changes import baseline_of
 from avow.assurance.model import Case
-from avow.assurance.modules import requirement_modules
 from avow.assurance.naming import short
 from avow.base.files import sha256
 from avow.base.plain import listed
@@ -20,6 +19,7 @@ from avow.evidence.status import Status
 from avow.report.answers_page import WORDS, full_reason
 from avow.report.exchange import render_json
 from avow.report.goals import argument
+from avow.report.modules import requirement_modules
 from avow.report.wording import MEANINGS
 
 

@@ -12,11 +12,9 @@ from dataclasses import field, replace
 from enum import StrEnum
 
 from avow.assurance.certification import ProofGrade
-from avow.assurance.model import Case, EvidenceView, ObligationView, RequirementView
-from avow.assurance.modules import RequirementModule, node_modules, requirement_modules
-from avow.assurance.naming import derivation_claim, is_foundation
+from avow.assurance.model import Case, EvidenceView, ObligationView
+from avow.assurance.naming import is_foundation
 from avow.assurance.relied import agrees, upper_bound
-from avow.base.plain import count, listed
 from avow.base.records import dataclass
 from avow.base.remembered import by_identity
 from avow.base.verdict import Link, Object
@@ -24,6 +22,7 @@ from avow.evidence.obligation import Kind, ProgramClaim
 from avow.evidence.record import Evidence
 from avow.evidence.status import Status, weigh
 from avow.report import wording
+from avow.report.modules import RequirementModule, node_modules, requirement_modules
 from avow.report.qualification import independence
 
 
@@ -168,7 +167,7 @@ class _Argument:
             context.append(Element(self.new(Sort.JUSTIFICATION), Sort.JUSTIFICATION, text))
         solutions = [s for name in r.obligations if name in self.views for s in self.solutions(self.views[name])]
         below = tuple(self.nodes[node] for node, _, _ in module.away)
-        strategy = Element(self.new(Sort.STRATEGY), Sort.STRATEGY, self.rule(r, len(below)), below)
+        strategy = Element(self.new(Sort.STRATEGY), Sort.STRATEGY, module.strategy, below)
         supported = (*([strategy.name] if below else []), *(s.name for s in solutions))
         goal = Element(
             self.requirements[r.id],
@@ -182,16 +181,6 @@ class _Argument:
             f"{r.id} [{r.stands}]",
         )
         return Module(f"requirement-{r.id}", r.words, (goal, *([strategy] if below else []), *context, *solutions))
-
-    def rule(self, r: RequirementView, nodes: int) -> str:
-        """The strategy in the words of the calculus, with the derivations that it uses."""
-        over = count(nodes, "node contract")
-        if not r.formal:
-            return f"A person's judgement over {over}"
-        used = [d.derivation for d in self.case.derivations if derivation_claim(d.derivation.name) in r.rests_on]
-        rules = listed([f"rule {d.rule} ({d.name})" for d in used], 4)
-        how = "model checking of the composition" if r.temporal else "entailment by the composed contracts"
-        return f"{rules}, then {how} of {over}" if rules else f"{how[:1].upper()}{how[1:]} of {over}"
 
     def node(self, name: str, title: str, guarantees: Sequence[ObligationView]) -> Module:
         goals, solutions = self.claims(guarantees)

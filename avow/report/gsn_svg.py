@@ -9,9 +9,9 @@ from collections.abc import Iterator, Sequence
 from xml.sax.saxutils import escape, quoteattr
 
 from avow.assurance.model import Case
-from avow.assurance.modules import node_modules, requirement_modules
 from avow.assurance.relied import shade
 from avow.base.records import dataclass
+from avow.report.modules import node_modules, requirement_modules
 from avow.report.wording import anchor, clean
 
 WIDTH, COLUMNS, GAP, SIZE = 720, 4, 8, 12

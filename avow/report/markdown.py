@@ -13,7 +13,7 @@ from avow.evidence.record import Evidence
 from avow.evidence.status import Status
 from avow.report.short import escaped, markdown_head
 from avow.report.source import plain_lines
-from avow.report.wording import bound_text, clean, gate_line, mutation, open_line, where, worth
+from avow.report.wording import NO_HAZARD, bound_text, clean, gate_line, hazard_rows, mutation, open_line, where, worth
 
 _BOUNDED = (Status.CHECKED, Status.TESTED, Status.MONITORED)
 """The statuses that are shown with their bounds."""
@@ -51,6 +51,13 @@ def render_markdown(case: Case) -> str:
         ),
         escaped(open_line(case)),
         *_remarks(case),
+        "## Hazards",
+        _table(
+            ("hazard", "what may happen", "severity", "how far it is mitigated"),
+            (tuple(map(escaped, row)) for row in hazard_rows(case)),
+        )
+        if case.hazards
+        else NO_HAZARD,
         "## Guarantees",
         _table(("guarantee", "criticality", "status", "evidence", "at"), (_row(view) for view in case.guarantees)),
         "## Environment",

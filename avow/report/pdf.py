@@ -11,7 +11,6 @@ from typing import Any
 from avow.assurance.answers import Assumption, SupposedLine
 from avow.assurance.changes import baseline_of
 from avow.assurance.model import Case, ObligationView, SourceView
-from avow.assurance.modules import RequirementModule, requirement_modules
 from avow.assurance.naming import short
 from avow.assurance.remarks import REMARK
 from avow.backend_kit.timeline import in_words, picture, timelines
@@ -25,9 +24,22 @@ from avow.evidence.status import Status
 from avow.report import PDF, example
 from avow.report.answers_page import full_reason, others, worded
 from avow.report.maps import map_picture
+from avow.report.modules import RequirementModule, requirement_modules
 from avow.report.page import by_node
 from avow.report.source import plain_lines
-from avow.report.wording import MARKS, bound_text, clean, in_lines, protocol, tone, worth
+from avow.report.wording import (
+    MARKS,
+    NO_HAZARD,
+    bound_text,
+    clean,
+    dangers,
+    hazard_rows,
+    in_lines,
+    protocol,
+    tone,
+    weakest,
+    worth,
+)
 
 _GATES = {"passes": "good", "fails": "bad", "not asked": "plain"}
 """The colour of each gate state."""
@@ -82,6 +94,8 @@ def _data(case: Case) -> dict[str, Any]:
         "assumptions": [_assumption(s) for s in case.assumptions],
         "deficits": [[str(w.count), w.words, w.why] for w in case.deficits],
         "modules": [_module(module) for module in requirement_modules(case)],
+        "hazards": hazard_rows(case),
+        "no_hazard": NO_HAZARD,
         "gates": [
             {
                 "title": g.title,
@@ -157,6 +171,8 @@ def _first(case: Case) -> dict[str, Any]:
         "verdict": f"{a.tone.mark} {a.verdict}",
         "tone": a.tone.value,
         "counts": a.beside,
+        "fails": f"Fails: {'; '.join(f.title for f in a.failures)}." if a.failures else "",
+        "hazards": "; ".join(f"{tone.mark} {level}: {names}" for tone, level, names in dangers(case)),
         "by_level": [
             [f"{number} {level}", ", ".join(r.id for r in case.requirements if r.level is level)]
             for level, number in a.by_level
@@ -168,7 +184,7 @@ def _first(case: Case) -> dict[str, Any]:
                 r.id,
                 r.words,
                 {"word": f"{r.tone.mark} {r.level}", "tone": r.tone.value},
-                f"{r.weakest_evidence.status}: {r.weakest_evidence.title}" if r.weakest_evidence else "none",
+                weakest(r),
                 str(len(r.supposes)),
                 r.noted,
             ]

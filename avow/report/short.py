@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 
 from avow.assurance.answers import ABOUT
 from avow.assurance.model import Case, RequirementView
-from avow.report.wording import clean
+from avow.report.wording import clean, weakest
 
 LINES, WIDTH, WORDS = 24, 80, 150
 _MARKDOWN = re.compile(r"([\\`*_{}\[\]#|<>~&$])")
@@ -76,7 +76,7 @@ def markdown_head(case: Case) -> Iterator[str]:
     yield "## 1 What is claimed?"
     rows = [
         f"| **{escaped(r.id)}** {escaped(_one(r))} | {r.tone.mark} {r.stands} "
-        f"| {escaped(_weakest(r))} | {len(r.supposes)} |"
+        f"| {escaped(weakest(r))} | {len(r.supposes)} |"
         for r in case.requirements
     ]
     head = "| requirement | how it stands | weakest evidence | assumptions |\n| --- | --- | --- | --- |\n"
@@ -105,12 +105,7 @@ def markdown_head(case: Case) -> Iterator[str]:
 
 def _standing(r: RequirementView) -> str:
     """For a short line: the rate, if there is one, else the weakest evidence."""
-    return r.stands if r.rate and r.rate.bound else f"{r.level}, {_weakest(r)}"
-
-
-def _weakest(r: RequirementView) -> str:
-    found = r.weakest_evidence
-    return f"{found.status}: {found.title}" if found else "no evidence"
+    return r.stands if r.rate and r.rate.bound else f"{r.level}, {weakest(r)}"
 
 
 def _weakest_words(case: Case) -> str:

@@ -10,9 +10,11 @@ from typing import Any
 from urllib.parse import quote
 
 from avow.assurance import naming
-from avow.assurance.model import Case, EvidenceView, ObligationView
+from avow.assurance.answers import Level, Tone
+from avow.assurance.hazards import WORST_FIRST
+from avow.assurance.model import Case, EvidenceView, ObligationView, RequirementView
 from avow.base.files import sha256
-from avow.base.plain import count
+from avow.base.plain import count, listed
 from avow.base.tuning.shown import DETAILS, FORMULA_COLUMNS
 from avow.evidence.obligation import SYSTEM_LEVEL, Kind
 from avow.evidence.record import RETRY, Evidence
@@ -335,3 +337,38 @@ def _plain(value: object) -> str:
             return value[:12]
         case _:  # shown as it is
             return str(value)
+
+
+def weakest(requirement: RequirementView) -> str:
+    """The weakest evidence of a requirement: ``tested: navigation``. For a sentence without a formula it is a person's
+    word that the guarantees amount to it."""
+    if requirement.level is Level.ARGUED and not requirement.formal:
+        return "argued: a person's word"
+    found = requirement.weakest_evidence
+    return f"{found.status}: {found.title}" if found else "none"
+
+
+def dangers(case: Case) -> list[tuple[Tone, Level, str]]:
+    """(colour, level, ``H1 (critical), H3 (marginal)``) of the hazards, the least mitigated first."""
+    found: list[tuple[Tone, Level, str]] = []
+    for level in WORST_FIRST:
+        if own := [view for view in case.hazards if view.level is level]:
+            names = [f"{view.hazard.id} ({view.hazard.severity})" for view in own]
+            found.append((min((view.tone for view in own), key=lambda tone: tone.rank), level, listed(names, 6)))
+    return found
+
+
+def hazard_rows(case: Case) -> list[tuple[str, str, str, str]]:
+    """(id, what may happen, severity and exposure, how far it is mitigated) of each hazard."""
+    return [
+        (
+            view.hazard.id,
+            view.hazard.text,
+            ", ".join(filter(None, (view.hazard.severity, view.hazard.exposure))),
+            f"{view.tone.mark} {view.stands}",
+        )
+        for view in sorted(case.hazards, key=lambda view: WORST_FIRST.index(view.level))
+    ]
+
+
+NO_HAZARD = "No hazard is declared in the plan: nothing shows that the requirements cover what may do harm."

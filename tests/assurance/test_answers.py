@@ -388,6 +388,16 @@ def test_the_first_screen_of_a_full_case_is_in_plain_words() -> None:
     ] == "refuted"
 
 
+def test_each_tool_with_an_answer_that_counts_is_to_be_trusted_and_a_refuted_contract_is_named() -> None:
+    claims, contract = [guarantee("a", name) for name in "ghk"], obligation("a", Kind.SANITY, "realizable")
+    made = [evidence(claims[0], Verdict.TESTED, "hypothesis"), evidence(claims[1], Verdict.MONITORED, "rosmonitoring")]
+    made += [evidence(claims[2], Verdict.CHECKED, "ajpf"), evidence(contract, Verdict.REFUTED, "sanity")]
+    found = case(system({"a": ["g", "h", "k"]}), [*claims, contract], made).answers
+    (line,) = (line for line in found.trusted if line.what == "tools whose answers have no certificate")
+    assert all(f"{record.tool_told} (1)" in line.which for record in made[:3])
+    assert found.based_on[0].words.endswith("; contract refuted")
+
+
 def test_which_assumptions_there_are_and_who_answers_for_them_is_said_in_a_line() -> None:
     def supposed(at: int, who: str, until: str) -> Assumption:
         key = f"environment.n.{at}"
@@ -397,6 +407,8 @@ def test_which_assumptions_there_are_and_who_answers_for_them_is_said_in_a_line(
     most = replace(said[2], needed_by=("R", "Q"))
     (line,) = _lines([*said[:2], most, *said[3:]])
     assert (line.number, line.about, line.more) == ("A3", "6 about the world", "also A1, A2, A4 to A6")
+    ideal = replace(said[3], key=REACTION)
+    assert [one.number for one in _lines([*said[:2], most, ideal])] == ["A4"], "an idealisation is in words"
     assert _owners(said) == "A. Person (4), B (2); the first ends 2027-01-01"
     assert _owners(said[:1]) == "A. Person, until 2027-01-01"
     assert _owners([replace(said[0], who="")]) == ""
@@ -488,7 +500,7 @@ def test_requirements_on_another_guarantee_of_the_weakest_node_are_counted_besid
     assert found is not None
     assert (found.needed_by, found.others) == (("R1", "H"), "; 2 on other guarantees of this node")
     assert whole.answers.next_weakest.startswith("a: “a meets h”: 10 cases")
-    assert whole.answers.verdict == "Argued (no failure rate)"
+    assert whole.answers.verdict == "Argued (no overall failure rate)"
     alone = case(system({"a": ["g"]}, requirements=asked[:1]), node[:1], made[:1]).answers.weakest
     assert alone is not None
     assert alone.others == ""

@@ -348,9 +348,10 @@ def test_a_marked_finding_is_that_one_and_no_later_one() -> None:
 
 def test_advice_fails_nothing_but_is_told() -> None:
     advice = obligation("n", Kind.SANITY, "not-redundant-g")
-    found = case(SYSTEM, [G, advice], [evidence(G), evidence(advice, Verdict.REFUTED, "sanity")])
-    assert found.exit_code == 0
-    assert [i.kind for i in found.open_items if i.advice] == ["advice"]
+    for verdict in (Verdict.REFUTED, Verdict.UNKNOWN):
+        found = case(SYSTEM, [G, advice], [evidence(G), evidence(advice, verdict, "sanity")])
+        assert found.exit_code == 0
+        assert [i.kind for i in found.open_items if i.advice] == ["advice"], verdict
     real = obligation("n", Kind.SANITY, "realizable")
     assert case(SYSTEM, [G, real], [evidence(G), evidence(real, Verdict.REFUTED, "sanity")]).exit_code == 1
 

@@ -21,10 +21,10 @@ EXAMPLES = ROOT / "docs/examples"
 TOOLS = ("clang", "strace", "dafny")
 """The recorded verdicts of the examples are those of a machine that has these."""
 VERDICTS = {
-    "warehouse": "Shown by tests (no failure rate)",
+    "warehouse": "Shown by tests (no overall failure rate)",
     "ventilator": "Shown of models",
-    "geofence": "Shown by tests (no failure rate)",
-    "docking": "Shown by tests (no failure rate)",
+    "geofence": "Shown by tests (no overall failure rate)",
+    "docking": "Shown by tests (no overall failure rate)",
 }
 
 

@@ -11,14 +11,16 @@ import pytest
 from assurance.sample import case as make_case
 from assurance.sample import evidence, guarantee, node_plan, rover_case, system
 
-from avow.assurance.answers import Failure
+from avow.assurance.answers import Failure, Level
 from avow.assurance.codec import read_case
 from avow.assurance.model import Case
 from avow.base.verdict import Verdict
 from avow.report.answers_page import render_answers, render_argument, worded
+from avow.report.markdown import render_markdown
 from avow.report.pdf import _data as pdf_data
 from avow.report.short import markdown_head, terminal_lines
-from avow.system.plan import Requirement, Statement
+from avow.report.wording import NO_HAZARD
+from avow.system.plan import Hazard, Requirement, Statement
 from report.chromium import measure
 from report.first_screen import counts, departures, words
 from report.hostile import hostile_case
@@ -76,6 +78,31 @@ CASES = {
     "hostile": hostile_case,
     "empty": lambda: make_case(system({}), [], []),
 }
+
+
+def test_each_gate_that_fails_is_in_the_banner_and_each_hazard_on_the_first_screen() -> None:
+    target, asked = guarantee("n", "g"), Requirement("R", "It is safe.", None, None, ("n.g",))
+    formal = replace(asked, id="F", formula="n.x > 0", supported_by=())
+    hazards = [Hazard(f"H{at}", "It burns", "critical", mitigated_by=("R",)[at:]) for at in range(9)]
+    subject = system({"n": ["g"]}, requirements=[asked, formal], hazards=hazards)
+    found = make_case(subject, [target], [evidence(target)])
+    failures = tuple(Failure(f"Gate {at}", "why", "") for at in range(4))
+    page = render_answers(replace(found, answers=replace(found.answers, failures=failures)))
+    told = " ".join(re.sub(r"<[^>]*>", " ", page).split())
+    assert "Gate 1: fails." in told
+    assert "Also fail: Gate 2; Gate 3 ." in told
+    assert "✘ not shown H1 (critical), H2 (critical), H3" in told
+    assert "H6 (critical) and 2 more ; ◐ argued H0 (critical) ." in told
+    assert "◐ argued argued: a person&#39;s word" in told
+    assert pdf_data(found)["first"]["hazards"].startswith("✘ not shown: H1 (critical)")
+    assert "| H8 | It burns | critical | ✘ no mitigation |" in render_markdown(found)
+    bare = make_case(system({"n": ["g"]}, requirements=[asked]), [target], [evidence(target)])
+    assert "none is declared" in render_answers(bare)
+    assert NO_HAZARD in render_answers(bare)
+    assert NO_HAZARD in render_markdown(bare)
+    every = replace(found.requirements[1], level=Level.SHOWN, rests_on=(target.id,))
+    assert "counts as resting on all" in render_argument(replace(found, requirements=(every,)))
+    assert "Entailment by the composed contracts" in render_argument(found)
 
 
 @pytest.mark.parametrize("name", CASES)
@@ -192,7 +219,7 @@ def test_assumptions_stand_in_words_on_paper_or_with_the_page_that_has_them() ->
     full = replace(found, assumptions=many, answers=replace(found.answers, supposed=(line,)))
     assert not worded(full)
     assert words(full) == []
-    assert "also A2 to A39, in words under" in both(full)
+    assert "also A2 to A39, under" in both(full)
     assert pdf_data(full)["first"]["supposed"][0][2] == "also A2 to A39"
 
 

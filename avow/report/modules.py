@@ -10,7 +10,8 @@ from collections.abc import Sequence
 
 from avow.assurance.answers import MEANINGS, Level
 from avow.assurance.model import Case, NodeView, ObligationView, RequirementView
-from avow.base.plain import count
+from avow.assurance.naming import derivation_claim
+from avow.base.plain import count, listed
 from avow.base.records import dataclass
 from avow.evidence.obligation import Kind
 from avow.evidence.status import Status
@@ -55,7 +56,8 @@ def requirement_modules(case: Case) -> tuple[RequirementModule, ...]:
         supposes = tuple(numbers[key] for key in r.supposes if key in numbers)
         failing = r.failing or r.below
         because = _because(case, r) + (f" F{r.rate.words[1:]}." if r.rate and r.level.holds else "")
-        found.append(RequirementModule(r, because, _strategy(r, len(away)), tuple(away), conditions, supposes, failing))
+        strategy = _strategy(case, r, len(away))
+        found.append(RequirementModule(r, because, strategy, tuple(away), conditions, supposes, failing))
     return tuple(found)
 
 
@@ -88,11 +90,17 @@ def _because(case: Case, r: RequirementView) -> str:
             return "Refuted: the contracts allow a counterexample."
         case _:  # every other level is derived
             within = ", within finite bounds that the evidence names" if r.bounded else ""
-            return f"{str(r.level).capitalize()}: {MEANINGS[r.level]}. A tool derived it{within}."
+            every = not r.supported_by and {view.id for view in case.guarantees} <= set(r.rests_on)
+            named = " The plan names no guarantee below it: it counts as resting on all of them." if every else ""
+            return f"{str(r.level).capitalize()}: {MEANINGS[r.level]}. A tool derived it{within}.{named}"
 
 
-def _strategy(r: RequirementView, nodes: int) -> str:
+def _strategy(case: Case, r: RequirementView, nodes: int) -> str:
+    """The strategy in the words of the calculus, with the derivations that it uses."""
     over = count(nodes, "node contract")
     if not r.formal:
         return f"A person's judgement over {over}"
-    return f"Composition of {over}"
+    used = [d.derivation for d in case.derivations if derivation_claim(d.derivation.name) in r.rests_on]
+    rules = listed([f"rule {d.rule} ({d.name})" for d in used], 4)
+    how = "model checking of the composition" if r.temporal else "entailment by the composed contracts"
+    return f"{rules}, then {how} of {over}" if rules else f"{how[:1].upper()}{how[1:]} of {over}"
