@@ -49,6 +49,13 @@ def lark_of(
     return parser
 
 
+def misfit(error: Any, text: str) -> tuple[str, int]:
+    """The word at which Lark could not continue, and its offset; an empty word at the end of the text."""
+    ended = getattr(getattr(error, "token", None), "type", "") == "$END"
+    at = len(text) if ended else error.pos_in_stream or 0
+    return next(iter(text[at:].split(maxsplit=1)), ""), at
+
+
 def _cache_file(name: str) -> Path | None:
     """A file in the user's own folder, since Lark's cache is a pickle: it is read only if this user's Avow wrote it,
     byte for byte. Other content could execute code or turn `<` into `<=`."""

@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import Any, TypeVar, assert_never
 
 from lark import Lark, Token, Tree
-from lark.exceptions import UnexpectedInput, UnexpectedToken
+from lark.exceptions import UnexpectedInput
 
-from avow.base.grammars import lark_of
+from avow.base.grammars import lark_of, misfit
 
 
 @dataclass(frozen=True, slots=True)
@@ -174,11 +174,9 @@ def _tree(text: str, start: str) -> Any:
     try:
         return _lark().parse(_without_commas(text), start=start)
     except UnexpectedInput as error:
-        ended = isinstance(error, UnexpectedToken) and error.token.type == "$END"
-        column = len(text) + 1 if ended or error.column < 1 else error.column
-        rest = text[column - 1 :].split(maxsplit=1)
-        what = f"did not expect `{rest[0]}` here" if rest else "the sentence ends too early"
-        raise Unreadable(what, column) from None
+        word, at = misfit(error, text)
+        what = f"did not expect `{word}` here" if word else "the sentence ends too early"
+        raise Unreadable(what, at + 1) from None
 
 
 def _without_commas(text: str) -> str:

@@ -16,7 +16,7 @@ from typing import Any
 
 from avow.base.diagnostics import Diagnostic, Rejected, Severity, Span
 from avow.base.files import read_regular
-from avow.base.grammars import lark_of
+from avow.base.grammars import lark_of, misfit
 from avow.base.records import dataclass
 from avow.base.suggestions import suggest
 from avow.base.tuning.sizes import ROS_GRAPH_ARCS, ROS_GRAPH_BYTES
@@ -222,10 +222,10 @@ def parse_dot(text: str) -> DotGraph:
         grammar = Path(__file__).with_name("dot.lark")
         _inside(lark_of(grammar, "dot", ("start",), maybe_placeholders=False).parse(text), found, {}, {})
     except UnexpectedInput as error:
-        rest = text[error.pos_in_stream or 0 :].split(maxsplit=1)
-        if not rest or getattr(getattr(error, "token", None), "type", "") == "$END":
+        word, _ = misfit(error, text)
+        if not word:
             raise Malformed("the graph ends too early for DOT", text.count("\n") + 1) from None
-        raise Malformed(f"{rest[0][:40]!r} does not belong in a DOT graph", error.line, error.column) from None
+        raise Malformed(f"{word[:40]!r} does not belong in a DOT graph", error.line, error.column) from None
     except RecursionError:
         raise Malformed("the graph is nested too deeply") from None
     return found

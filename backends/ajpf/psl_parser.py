@@ -5,17 +5,22 @@ Beyond AJPF's syntax, arguments may be index variables and ``i + 1`` of them, to
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+from lark import Token, Transformer
+from lark.exceptions import UnexpectedInput
+
+from avow.base.grammars import lark_of, misfit
 
 from . import psl
 from .psl import Atom, Formula, Modality
 from .terms import Struct, Term, Var, subterms
 from .tuning import PROPERTY_LENGTH, PROPERTY_NESTING
 
-_TOKEN = re.compile(r"\s*(\[\]|<>|->|\|\||[~&(),+\-]|[A-Za-z_][A-Za-z0-9_']*|[0-9]+(?:\.[0-9]+)?|\Z|.)", re.DOTALL)
-_NUMBER = re.compile(r"[0-9]+(\.[0-9]+)?\Z")
 _BINARY: Mapping[str, Callable[[Formula, Formula], Formula]] = {"U": psl.Until, "R": psl.Release, "->": psl.Implies}
 _JUNCTIONS: Mapping[str, Callable[[tuple[Formula, ...]], Formula]] = {"&": psl.And, "||": psl.Or}
 _UNARY: Mapping[str, tuple[Callable[[Formula], Formula], int]] = {
@@ -35,140 +40,96 @@ class Malformed(Exception):  # noqa: N818 - it names the text
         self.offset = offset
 
 
-@dataclass(frozen=True, slots=True)
-class _Token:
-    text: str
-    offset: int
-
-
 def parse_psl(text: str) -> Formula:
     """Raises Malformed."""
     if len(text) > PROPERTY_LENGTH:
         raise Malformed(f"longer than {PROPERTY_LENGTH} characters", 0)
-    parser = _Parser([_Token(found[1], found.start(1)) for found in _TOKEN.finditer(text)])
-    formula = parser.property(0)
-    if parser.now.text:
-        raise Malformed(
-            f"unexpected {parser.now.text!r} after the formula; AJPF would ignore the rest", parser.now.offset
-        )
+    depth = 0
+    for at, sign in enumerate(text):
+        depth += (sign == "(") - (sign == ")")
+        if depth > PROPERTY_NESTING:
+            raise Malformed(f"brackets nested more than {PROPERTY_NESTING} deep", at)
+    grammar = lark_of(Path(__file__).with_name("psl.lark"), "psl", ("row",), _Builder, lexer="contextual")
+    try:
+        formula: Formula = grammar.parse(text)
+    except UnexpectedInput as error:
+        word, at = misfit(error, text)
+        reason = f"did not expect {word!r} here" if word else "the formula ends too early"
+        if "$END" in (getattr(error, "accepts", None) or ()):
+            reason = f"unexpected {word!r} after the formula; AJPF would ignore the rest"
+        raise Malformed(reason, at) from None
     return formula
 
 
-class _Parser:
-    def __init__(self, tokens: list[_Token]) -> None:
-        self.tokens = tokens
-        self.at = 0
+class _Builder(Transformer):  # type: ignore[misc]
+    """Makes the formula while the text is parsed, so that nothing recurses."""
 
-    @property
-    def now(self) -> _Token:
-        return self.tokens[self.at]
-
-    def take(self, text: str | None = None) -> _Token:
-        token = self.now
-        if text is not None and token.text != text:
-            raise Malformed(f"expected {text!r}, found {token.text or 'the end'!r}", token.offset)
-        if token.text:
-            self.at += 1
-        return token
-
-    def property(self, depth: int) -> Formula:
+    def row(self, parts: list[Any]) -> Formula:
         """One kind of operator at a level: a mixture is refused, as AJPF's precedences are not what people expect."""
-        if depth > PROPERTY_NESTING:
-            raise Malformed(f"brackets nested more than {PROPERTY_NESTING} deep", self.now.offset)
-        items = [self.unary(depth)]
-        operator = self.now
-        while self.now.text in _BINARY or self.now.text in _JUNCTIONS:
-            token = self.take()
-            if token.text != operator.text:
+        items, operators = parts[::2], parts[1::2]
+        if not operators:
+            return items[0]  # type: ignore[no-any-return]
+        first = str(operators[0])
+        for token in operators[1:]:
+            if token != first:
                 raise Malformed(
-                    f"'{operator.text}' and '{token.text}' without brackets: AJPF binds '||' tighter than '&', "
+                    f"'{first}' and '{token}' without brackets: AJPF binds '||' tighter than '&', "
                     "'&' tighter than '->'; say which is meant",
-                    token.offset,
+                    token.start_pos,
                 )
-            items.append(self.unary(depth))
-            if token.text in _BINARY and len(items) > 2:
-                raise Malformed(f"'{token.text}' in a row: AJPF brackets to the left; say which is meant", token.offset)
-        if len(items) == 1:
-            return items[0]
-        if operator.text in _JUNCTIONS:
-            return _JUNCTIONS[operator.text](tuple(items))
-        return _BINARY[operator.text](items[0], items[1])
+            if token in _BINARY:
+                raise Malformed(f"'{token}' in a row: AJPF brackets to the left; say which is meant", token.start_pos)
+        return _JUNCTIONS[first](tuple(items)) if first in _JUNCTIONS else _BINARY[first](*items)
 
-    def unary(self, depth: int) -> Formula:
-        token = self.now
-        if token.text not in _UNARY:
-            return self.atom(depth)
-        self.take()
-        inner = self.now
-        make, loose = _UNARY[token.text]
-        if inner.text in _UNARY and _UNARY[inner.text][1] >= loose:
-            raise Malformed(
-                f"'{token.text}{inner.text}' loses an operator in AJPF: write {token.text}({inner.text} …)",
-                inner.offset,
-            )
-        return make(self.unary(depth))
+    def unary(self, parts: list[Any]) -> Formula:
+        *prefixes, formula = parts
+        for outer, inner in pairwise(prefixes):
+            if _UNARY[inner][1] >= _UNARY[outer][1]:
+                raise Malformed(
+                    f"'{outer}{inner}' loses an operator in AJPF: write {outer}({inner} …)", inner.start_pos
+                )
+        for prefix in reversed(prefixes):
+            formula = _UNARY[prefix][0](formula)
+        return formula  # type: ignore[no-any-return]
 
-    def atom(self, depth: int) -> Formula:
-        token = self.take()
-        match token.text:
-            case "(":
-                inner = self.property(depth + 1)
-                self.take(")")
-                return inner
-            case "T":
-                return psl.TRUE
-            case "F":
-                return psl.FALSE
-            case "P" | "B" | "G" | "I" | "ItD" | "D":
-                self.take("(")
-                agent = ""
-                if token.text != "P":
-                    name = self.take()
-                    agent = name.text
-                    if agent in psl.KEYWORDS or not psl.AGENT_NAME.match(agent):
-                        raise Malformed(f"{agent!r} cannot be an agent's name in AJPF", name.offset)
-                    self.take(",")
-                term = self.struct(depth)
-                self.take(")")
-                return Atom(Modality(token.text), agent, term)
-            case _:  # no formula begins so: reported below
-                shown = repr(token.text) if token.text else "the end"
-                raise Malformed(f"expected a proposition such as B(agent, fact), found {shown}", token.offset)
+    def truth(self, parts: list[Token]) -> Formula:
+        return psl.TRUE if parts[0] == "T" else psl.FALSE
 
-    def struct(self, depth: int) -> Struct:
-        at = self.now.offset
-        term = self.term(depth)
-        if isinstance(term, Var) or not psl.AGENT_NAME.match(term.functor):
-            raise Malformed("expected a fact such as going(3)", at)
-        return term
+    def modal(self, parts: list[Any]) -> Formula:
+        modality, agent, fact = parts
+        if agent in psl.KEYWORDS or not psl.AGENT_NAME.match(agent):
+            raise Malformed(f"'{agent}' cannot be an agent's name in AJPF", agent.start_pos)
+        return Atom(Modality(modality), str(agent), fact)
 
-    def term(self, depth: int) -> Term:
-        if depth > PROPERTY_NESTING:
-            raise Malformed(f"terms nested more than {PROPERTY_NESTING} deep", self.now.offset)
-        token = self.take()
-        if token.text == "_":
-            return Var("_")
-        if token.text == "-":
-            raise Malformed("AJPF's properties know no negative numbers", token.offset)
-        if _NUMBER.match(token.text):
-            return Struct(token.text)
-        if not re.match(r"[A-Za-z][A-Za-z0-9_']*\Z", token.text):
-            raise Malformed(f"expected a term, found {token.text or 'the end'!r}", token.offset)
-        if token.text[0].isupper():
-            raise Malformed("AJPF's properties know no named variables: write _", token.offset)
-        if self.now.text in ("+", "-"):
-            operator = self.take().text
-            number = self.take()
-            if not re.match(r"[0-9]+\Z", number.text):
-                raise Malformed("expected a whole number, as in i + 1", number.offset)
-            return Struct(operator, (Struct(token.text), Struct(number.text)))
-        args: list[Term] = []
-        if self.now.text == "(":
-            while self.now.text == "," or not args:
-                self.take()
-                args.append(self.term(depth + 1))
-            self.take(")")
-        return Struct(token.text, tuple(args))
+    def percept(self, parts: list[Any]) -> Formula:
+        return Atom(Modality.PERCEPT, "", parts[1])
+
+    def fact(self, parts: list[Any]) -> Struct:
+        if not psl.AGENT_NAME.match(parts[0]):
+            raise Malformed("expected a fact such as going(3)", parts[0].start_pos)
+        return self.struct(parts)
+
+    def struct(self, parts: list[Any]) -> Struct:
+        name, *args = parts
+        if name[0].isupper():
+            raise Malformed("AJPF's properties know no named variables: write _", name.start_pos)
+        return Struct(str(name), tuple(args))
+
+    def shifted(self, parts: list[Token]) -> Struct:
+        """An index and a whole number."""
+        name, operator, number = parts
+        if "." in number:
+            raise Malformed("expected a whole number, as in i + 1", number.start_pos)
+        return Struct(str(operator), (self.struct([name]), Struct(str(number))))
+
+    def number(self, parts: list[Token]) -> Struct:
+        return Struct(str(parts[0]))
+
+    def negative(self, parts: list[Token]) -> Struct:
+        raise Malformed("AJPF's properties know no negative numbers", parts[0].start_pos)
+
+    def anything(self, parts: list[Token]) -> Var:
+        return Var("_")
 
 
 def instantiate(formula: Formula, values: Mapping[str, int]) -> Formula:
