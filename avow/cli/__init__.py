@@ -5,6 +5,7 @@ Exit codes, the same for all: 0 success; 1 a gate or a check fails; 2 bad input 
 
 from __future__ import annotations
 
+import gc
 import importlib
 import io
 import os
@@ -13,12 +14,15 @@ from typing import Any
 
 from avow.base.module_path import leave_here
 from avow.base.suggestions import did_you_mean
+from avow.base.tuning.running import COLLECTED
 
 leave_here()  # before any import that a module in another's folder could replace
 
 import click  # noqa: E402
 
 from avow import __version__  # noqa: E402
+
+gc.set_threshold(COLLECTED)  # a command's objects mostly stay alive, so collections find little
 
 COMMANDS = {
     "agent": "run an agent program step by step, on percepts that you give",

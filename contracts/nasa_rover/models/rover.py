@@ -4,6 +4,7 @@ from collections import deque
 from fractions import Fraction
 
 USE = Fraction(3, 100)
+PACE = Fraction(36, 10)
 MARGIN = Fraction(95, 100)
 
 
@@ -41,7 +42,8 @@ def interface(planC, lengthC, planD, lengthD, battery):  # noqa: N803 - ports' n
 def hardware(movement, place, energy, charger):
     """The worst that the contract allows: every step costs all that it may."""
     position = movement if energy >= USE else place
-    return {"position": position, "charge": Fraction(1) if position == charger else max(energy - USE, Fraction(0))}
+    charge = Fraction(1) if position == charger else max(energy - USE, Fraction(0))
+    return {"position": position, "charge": charge, "speed": Fraction(0) if position == place else PACE}
 
 
 def shortest_plan(start, goal, free, step):
