@@ -48,7 +48,8 @@ def shortfall(view: ObligationView, demand: Demand, policy: Policy, today: date)
     if number < demand.methods:
         kind = "independent method" if demand.independent else "method"
         return f"{count(number, kind)}, but {demand.methods} are asked{because}"
-    return None
+    # that another method answered does not make good what this one could not do
+    return next((f"{one.method} failed: {one.summary}" for one in kept if one.verdict is Verdict.ERROR), None)
 
 
 def independent(evidence: Iterable[Evidence]) -> int:

@@ -101,12 +101,12 @@ def summarized(job: Job, diagnostics: Sequence[Diagnostic], most: int = 5) -> st
 
 
 def _line(job: Job, diagnostic: Diagnostic) -> str:
-    span = diagnostic.span
-    if span is None:
-        return diagnostic.message
+    span, told = diagnostic.span, f"{diagnostic.message} ({diagnostic.hint})" if diagnostic.hint else diagnostic.message
+    if span is None or not span.file:
+        return told
     path, root = Path(span.file), job.root.resolve()
     name = path.relative_to(root).as_posix() if path.is_relative_to(root) else path.name
-    return f"{name}:{span.line}: {diagnostic.message}"
+    return f"{name}:{span.line}: {told}"
 
 
 def job_for(folder: Path, node: str, backend: str, method: str | None, *, wrong: str, hint: str) -> Job:

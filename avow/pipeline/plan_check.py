@@ -154,8 +154,10 @@ def _method(
         method = replace(method, options=options)
         if any(misshapen(tool.options_schema, options, whole)):
             return  # without the faulty options the others mean nothing
-    if node in [n.name for n in system.contract.nodes]:
-        job = method_job(system, system.contract.node(node), method)
+    for known in (n for n in system.contract.nodes if n.name == node):
+        named = {clause.name for clause in known.guarantees}  # others are reported where the plan names them
+        method = replace(method, guarantees=tuple(name for name in method.guarantees if name in named))
+        job = method_job(system, known, method)
         yield from (d for d in one_step.check(tool, job) if not (follows(d) or d.span in without))
 
 

@@ -335,6 +335,8 @@ class _Work:
         if count.undecided:
             why = f"{count.undecided} judgements are undecided: {count.reason or 'no calculation tells'}"
         elif not count.held:
+            if not count.reason and not count.excused:
+                outcome = replace(outcome, verdict=Verdict.ERROR)
             why = "no publication was judged: " + (count.reason or "the class never published all that it speaks of")
             why = f"{count.excused} times only with an assumption broken" if count.excused else why
         else:

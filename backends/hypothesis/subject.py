@@ -80,6 +80,12 @@ def subject(job: Job) -> SubjectFile:
             where, wanted = job.source.place.at("source", "class"), job.source.class_name
             hint = suggest(wanted, [name for name, one in defined.items() if isinstance(one, ast.ClassDef)])
             raise Rejected(Diagnostic("HYPO102", f"`{found.name}` defines no class `{wanted}`", where, hint=hint))
+        meant = [kind for kind in (Driving.RCLPY, Driving.ROSPY) if kind in _imported(tree)]
+        if len(meant) == 1 and job.source.kind not in meant and _inherited(declared, "step", defined) is None:
+            message = f"`{found.name}` imports {meant[0]}, and `kind` is {job.source.kind}"
+            raise Rejected(
+                Diagnostic("HYPO107", message, job.source.place.at("source"), hint=f"write `kind: {meant[0]}`")
+            )
         if job.source.kind is not Driving.STEP:
             return found
         begun = _method(declared, "__init__")
@@ -240,14 +246,19 @@ def modules(path: Path) -> tuple[Path, ...]:
             tree = ast.parse(read_regular(file))
         except (OSError, ValueError, SyntaxError, RecursionError):
             continue
-        for node in ast.walk(tree):
-            names = [node.module or ""] if isinstance(node, ast.ImportFrom) else []
-            names += [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
-            heads = {name.partition(".")[0] for name in names} - {""}
-            for head in sorted(heads):
-                beside = (path.parent / f"{head}.py", path.parent / head / "__init__.py")
-                stack.extend(candidate for candidate in beside if candidate.is_file())
+        for head in sorted(_imported(tree)):
+            beside = (path.parent / f"{head}.py", path.parent / head / "__init__.py")
+            stack.extend(candidate for candidate in beside if candidate.is_file())
     return tuple(sorted(found))
+
+
+def _imported(tree: ast.Module) -> set[str]:
+    """The first names of the modules that a file imports, at any place."""
+    names: set[str] = set()
+    for node in ast.walk(tree):
+        names |= {node.module or ""} if isinstance(node, ast.ImportFrom) else set()
+        names |= {alias.name for alias in node.names} if isinstance(node, ast.Import) else set()
+    return {name.partition(".")[0] for name in names} - {""}
 
 
 def _top_level(tree: ast.Module) -> dict[str, ast.stmt]:

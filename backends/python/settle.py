@@ -106,10 +106,9 @@ class Work:
         if cases is None:
             return self.alike(Verdict.UNKNOWN, self.refusals())
         fault = self.try_recorded(formulas, assumed) or self.try_all(cases, formulas, assumed)
-        if fault and reading.step is None and not self.deed:
-            return self.alike(Verdict.UNKNOWN, f"{self.refusals()} ({fault})")
         if fault:
-            return self.alike(Verdict.ERROR, fault)
+            outside = reading.step is None and not self.deed
+            return self.alike(Verdict.ERROR, f"{self.refusals()} ({fault})" if outside else fault)
         if reading.step is None:
             return tuple(self.refuted(o) or Outcome(o.id, Verdict.UNKNOWN, self.refusals()) for o in job.obligations)
         made = {port: reading.step.start[attribute] for port, attribute in reading.step.memory.items()}

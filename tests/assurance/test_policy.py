@@ -134,6 +134,12 @@ def test_no_single_point_of_evidence() -> None:
     assert not gate(the_case("default", PROOF, same_solver))[0]  # two wrappings of one solver are one
 
 
+def test_a_method_that_failed_is_not_hidden_by_another_that_answered() -> None:
+    failed = evidence("n.g", Verdict.ERROR, "review", summary="the class is not made: KeyError")
+    passed, reason = gate(the_case("default", PROOF, TEST, failed))
+    assert (passed, "review failed: the class is not made: KeyError" in reason) == (False, True)
+
+
 def test_independence_is_a_matching() -> None:
     def item(backend: str, tool: str) -> Evidence:
         return replace(PROOF, backend=backend, tool=tool)

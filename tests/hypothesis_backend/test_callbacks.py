@@ -157,6 +157,20 @@ def test_exact_numbers_are_none_of_messages(tmp_path: Path) -> None:
     assert [d.code for d in TOOL.check(given)] == ["MON101"]
 
 
+def test_a_class_of_one_ros_is_not_driven_as_another(tmp_path: Path) -> None:
+    for kind, text in (("rclpy", ROS1), ("rospy", ROS2), ("step", ROS2)):
+        given = job(tmp_path / kind, kind, text)
+        (found,) = (d for d in TOOL.check(given) if d.is_error)
+        assert (found.code, found.hint) == ("HYPO107", f"write `kind: {'rospy' if text is ROS1 else 'rclpy'}`")
+
+
+@pytest.mark.slow
+def test_a_class_that_never_publishes_fails(tmp_path: Path) -> None:
+    """That another method answers from an old recording does not hide it."""
+    found = asked(job(tmp_path / "w", "rospy", ROS1.replace("self.said.publish(", "str(")))
+    assert {o.verdict for o in found.values()} == {Verdict.ERROR}, found
+
+
 def test_the_names_by_which_it_runs_are_part_of_the_key(tmp_path: Path) -> None:
     given = job(tmp_path / "w", "rospy", ROS1)
     plan = (tmp_path / "w/plan.yaml").read_text(encoding="utf-8")

@@ -109,6 +109,9 @@ def test_a_hidden_state_is_told_with_its_line(tmp_path: Path) -> None:
     found = Example(source, LIMITER_RCL, "Limiter", {"vmax": 1.5}).settled(tmp_path)
     assert {o.verdict for o in found.values()} == {Verdict.UNKNOWN}
     assert "node.py:11: self.n is changed by a step" in found["same"].summary
+    unmade = source.replace('params["vmax"]', 'params["vmaxx"]')
+    found = Example(unmade, LIMITER_RCL, "Limiter", {"vmax": 1.5}).settled(tmp_path / "unmade")
+    assert {o.verdict for o in found.values()} == {Verdict.ERROR}
 
 
 UNROLLED = """class Limiter:

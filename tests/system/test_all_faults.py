@@ -78,6 +78,7 @@ FAULTS: dict[str, tuple[str, str, str, str]] = {
     "duplicate key": ("plan.yaml", "system: home", "system: home\nsystem: house", "PLAN102"),
     "unknown key": ("plan.yaml", "    supported_by: [thermostat.warms]", "    supports: [thermostat.warms]", "PLAN103"),
     "no such guarantee": ("plan.yaml", "[thermometer.calibrated]", "[thermometer.calibrates]", "PLAN106"),
+    "no such guarantee of a method": ("plan.yaml", "cases: 50", "cases: 50, guarantees: [calibratd]", "PLAN106"),
     "no such node": ("plan.yaml", "[thermometer, thermostat]", "[thermometer, boiler]", "PLAN106"),
     "no such level": ("plan.yaml", "criticality: high", "criticality: huge", "PLAN105"),
     "no such policy": ("plan.yaml", "policy: default", "policy: defalt", "POLICY001"),
