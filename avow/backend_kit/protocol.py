@@ -211,8 +211,8 @@ class Judged:
     excused: int = 0
     """With an assumption broken."""
     undecided: int = 0
-    triggered: bool = False
-    """Its antecedent was met, or it has none."""
+    met: tuple[bool, ...] = ()
+    """Of each condition under which it demands something: whether it was met."""
     shown: Counterexample | None = None
     """The first breach, or the first output value that is not of its type."""
     at: int = 0

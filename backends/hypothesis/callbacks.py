@@ -103,8 +103,8 @@ class _Count:
     held: int = 0
     excused: int = 0
     undecided: int = 0
-    triggered: int = 0
-    """Runs in which its antecedent was met."""
+    met: Sequence[int] = ()
+    """Of each of its conditions: in how many runs it was met."""
     reason: str = ""
 
 
@@ -197,7 +197,7 @@ class _Work:
                 count.held += one.held
                 count.excused += one.excused
                 count.undecided += one.undecided
-                count.triggered += drawn and one.triggered
+                count.met = [n + (drawn and m) for n, m in zip(count.met or [0] * len(one.met), one.met, strict=True)]
                 count.reason = count.reason or one.reason
                 if self.wrong(name, run, judged) is not None:
                     self.failing.setdefault(name, events)
@@ -343,16 +343,16 @@ class _Work:
             why = unsteady or stopped
         if why:
             return replace(outcome, summary=why)
-        if not count.triggered:
+        if not (triggered := min(count.met, default=self.runs)):
             return replace(outcome, summary=f"in none of {self.runs} runs was its condition met", vacuous=True)
-        bound |= {"confidence": tuning.CONFIDENCE, "triggered": count.triggered}
+        bound |= {"confidence": tuning.CONFIDENCE, "triggered": triggered}
         bound["failure_probability_below"] = failure_bound(self.runs)
-        bound["failure_probability_when_triggered_below"] = failure_bound(count.triggered)
+        bound["failure_probability_when_triggered_below"] = failure_bound(triggered)
         before = f", {self.replayed} that refuted it or a neighbour before" if self.replayed else ""
         before += f", {self.unanswered} messages without an answer" if self.unanswered else ""
         summary = (
             f"{self.runs} drawn runs of {self.messages} messages{before}: held at {count.held} judgements, none breaks "
-            f"it (seed {self.limits.seed}; 95 %: below {shown_bound(count.triggered)} of such runs fail)"
+            f"it (seed {self.limits.seed}; 95 %: below {shown_bound(triggered)} of such runs fail)"
         )
         return replace(outcome, verdict=Verdict.TESTED, summary=summary)
 

@@ -10,6 +10,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from fractions import Fraction
+from functools import reduce
+from operator import and_
 from typing import TYPE_CHECKING, Any
 
 from avow.formulas.values import Value
@@ -223,7 +225,7 @@ def judge_answer(monitor: Monitor, asked: Asked, choices: Choices, found: list[V
         return
     tally.aged(asked.seconds, asked.since, watched.paired)
     tally.judged += 1
-    tally.triggered = tally.triggered or all(watched.triggered(values) for values in cases)
+    tally.met |= reduce(and_, (watched.met(values) for values in cases))
     (verdict,) = verdicts
     if verdict is None:
         tally.undecided += 1
@@ -273,7 +275,7 @@ def withdraw(monitor: Monitor, found: list[Violation]) -> list[Violation]:
         tally = watched.tally
         tally.order += tally.judged
         tally.judged = tally.broken = tally.excused = tally.undecided = 0
-        tally.triggered = watched.trigger is None
+        tally.met = 0
         tally.reason = tally.reason or monitor.backwards
     return [v for v in found if v.fault is Fault.MAPPING or v.clause not in monitor.by_order]
 

@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from avow.evaluation.evaluate import NotEvaluable
 from avow.ros.bags import ENVELOPE, LIVE, Event
@@ -53,8 +54,8 @@ class _Plan:
 class _Judged:
     """One clause at the rows of one topic."""
 
-    met: Flags
-    """The rows at which the antecedent is met."""
+    met: Ints
+    """Which of its conditions are met at each row."""
     ages: dict[str, Floats] = field(default_factory=dict)
     """The age of each input, in seconds; -1 if it has not come."""
 
@@ -75,7 +76,7 @@ class Watch:
                 self._columns[name].regions = None
                 self._columns[name].clear()
         self._plans: dict[str, _Plan | None] = {}
-        self._truths: dict[int, dict[tuple[int, ...], tuple[bool, bool, bool]]] = {}
+        self._truths: dict[int, dict[tuple[int, ...], tuple[bool, int, bool]]] = {}
         self._now: dict[str, int] = {}
         """The code of each variable before the batch."""
         self._known: dict[str, tuple[Ints, Ints]] = {}
@@ -201,15 +202,15 @@ class Watch:
         side = "left" if isinstance(rule, Previous) else "right"
         return np.concatenate(([self._now[name]], codes))[np.searchsorted(own, rows, side)]  # type: ignore[call-overload]
 
-    def holds(self, watched: Watched, rows: Ints, others: Mapping[str, Ints]) -> tuple[Flags, Flags, Flags]:
-        """The rows at which a clause certainly holds, at which its antecedent is met, and at which it certainly does
-        not hold. `others`: codes that are not of the latest values."""
+    def holds(self, watched: Watched, rows: Ints, others: Mapping[str, Ints]) -> tuple[Flags, Ints, Flags]:
+        """The rows at which a clause certainly holds, which of its conditions are met at each, and the rows at which it
+        certainly does not hold. `others`: codes that are not of the latest values."""
         names = [name for name in watched.names if name in self._now]
         columns = [others[name] if name in others else self.codes(name, rows) for name in names]
         known: Flags = np.logical_and.reduce([codes >= 0 for codes in columns])
         every = bool(known.all())
         if not known.any():
-            return known, known, known
+            return known, known.astype(np.int64), known
         if not every:
             columns = [codes[known] for codes in columns]
         first, which = combinations(columns, [len(self._column_of(name).values) for name in names])
@@ -219,25 +220,24 @@ class Watch:
             if key not in truths:
                 truths[key] = self._judge(watched, dict(zip(names, key, strict=True)))
             verdicts.append(truths[key])
-        holds, met, fails = (np.array(column, np.bool_)[which] for column in zip(*verdicts, strict=True))
+        held, conditions, failed = zip(*verdicts, strict=True)
+        holds, fails = (np.array(column, np.bool_)[which] for column in (held, failed))
+        met = np.array(conditions, np.int64)[which]
         return (holds, met, fails) if every else (_spread(known, holds), _spread(known, met), _spread(known, fails))
 
     def _column_of(self, name: str) -> Column:
         return self._columns[heard_through(self._rules[name])]
 
-    def _judge(self, watched: Watched, codes: Mapping[str, int]) -> tuple[bool, bool, bool]:
-        """Whether a clause holds for the values, whether its antecedent is met (also if it cannot be evaluated), and
-        whether the clause fails."""
+    def _judge(self, watched: Watched, codes: Mapping[str, int]) -> tuple[bool, int, bool]:
+        """Whether a clause holds for the values, which of its conditions are met (also if that cannot be evaluated),
+        and whether the clause fails."""
         values: dict[str, Any] = {n: self.monitor.values[n] for n in watched.names if n not in codes}
         values |= {name: self._column_of(name).values[code] for name, code in codes.items()}
         try:
             holds = bool(watched.holds(values))
         except NotEvaluable:
-            return False, False, False
-        try:
-            return holds, watched.trigger is None or bool(watched.trigger(values)), not holds
-        except NotEvaluable:
-            return holds, True, not holds
+            return False, 0, False
+        return holds, watched.met(values, unknown=True), not holds
 
     def _ages(self, name: str, rows: Ints, times: Floats) -> Floats:
         own = self._known.get(name, (NONE, NONE))[0]
@@ -268,7 +268,7 @@ class Watch:
                 tally, judged = watched.tally, self._judged[topic, id(watched)]
                 tally.published += high - low
                 tally.judged += high - low
-                tally.triggered = tally.triggered or bool(judged.met[low:high].any())
+                tally.met |= int(np.bitwise_or.reduce(judged.met[low:high]))
                 for name, ages in judged.ages.items():
                     tally.aging(name, float(ages[low:high].max()))
         for row in sorted(last):
@@ -286,8 +286,8 @@ class Watch:
         return sure(self.monitor, found)
 
 
-def _spread(where: Flags, flags: Flags) -> Flags:
-    found = np.zeros(len(where), np.bool_)
+def _spread(where: Flags, flags: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    found = np.zeros(len(where), flags.dtype)
     found[where] = flags
     return found
 

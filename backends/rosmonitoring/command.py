@@ -253,7 +253,7 @@ def _print_summary(running: Session) -> None:
     for monitor, name, kind, tally in running.clauses():
         words = [coverage(tally) if tally.published else f"judged {tally.judged} times"]
         if tally.judged and not tally.triggered and not tally.broken:
-            words.append("its antecedent was never met")
+            words.append("a condition of it was never met")
         if tally.reason:
             words.append(tally.reason)
         if monitor.backwards:

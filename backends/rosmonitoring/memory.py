@@ -30,7 +30,7 @@ from avow.language.terms import History, Implies, Past, Quantified, Role, Term, 
 from .options import Setup
 from .pace import Leeway, Silence, moments
 from .rules import Previous
-from .watched import Tally, Watched, trigger_of
+from .watched import Tally, Watched, conditions_of
 from .word import undetermined
 
 
@@ -263,7 +263,7 @@ class Memory:
             self.stepped = event
             self.forget()
             return truth
-        watched.tally.triggered = watched.tally.triggered or watched.triggered(self.at(values))
+        watched.tally.met |= watched.met(self.at(values))
         self.advance(values, event)
         return truth
 
@@ -280,7 +280,7 @@ MUTE = "a response is due of which no message was ever heard: its topic may not 
 
 def watch(clause: Clause, tally: Tally, setup: Setup) -> Watched:
     """A clause under watch. Raises NotEvaluable if it cannot be judged."""
-    formula, trigger, steps = clause.formula, trigger_of(clause.formula), None
+    formula, triggers, steps = clause.formula, conditions_of(clause.formula), None
     names = set[str]()
     if histories(formula):
         in_time = timed(formula) is not None
@@ -292,11 +292,11 @@ def watch(clause: Clause, tally: Tally, setup: Setup) -> Watched:
         silence: Silence | None = None
         try:
             demanded, waiting = in_the_past(asked), pending(asked)
-            trigger = fulfilled(asked) or trigger_of(demanded)
+            triggers = (met,) if (met := fulfilled(asked)) else conditions_of(demanded)
             if in_time and not every:
                 with suppress(Unsaid):
                     demanded, separate = _apart(demanded), True
-                    trigger, waiting = trigger and _apart(trigger), waiting and _apart(waiting)
+                    triggers, waiting = tuple(map(_apart, triggers)), waiting and _apart(waiting)
             if in_time:
                 positions = records.positions(demanded)
                 holds, breaks = records.instants(positions)
@@ -307,7 +307,7 @@ def watch(clause: Clause, tally: Tally, setup: Setup) -> Watched:
                 silence = Silence(compiled, moved, regular, setup.leeway)
             else:
                 formula = records.clause(formula)
-            trigger = None if trigger is None else records.past(trigger, in_time=in_time)
+            triggers = tuple(records.past(trigger, in_time=in_time) for trigger in triggers)
             waiting = None if waiting is None else records.past(waiting, in_time=in_time)
         except Unsaid as unsaid:
             raise NotEvaluable(f"the monitors have no {unsaid.reason}") from None
@@ -318,7 +318,7 @@ def watch(clause: Clause, tally: Tally, setup: Setup) -> Watched:
         steps.awaits = response is not None and not response[0] and response[2].operator is Past.WITHIN
         steps.every, steps.apart = every, separate
         names = {n for c in records.cells for n in free_names(c.now) - {p.name for p in c.parameters}}
-        for term in (formula, waiting, trigger):
+        for term in (formula, waiting, *triggers):
             names |= free_names(term) if term is not None else set()
         names -= {CLOCK.qualified, ANSWERED.qualified, *(cell.before.qualified for cell in records.cells)}
         names = set(map(_port_of, names))
@@ -332,7 +332,7 @@ def watch(clause: Clause, tally: Tally, setup: Setup) -> Watched:
         clause,
         tuple(sorted(names if steps is not None else free_names(formula))),
         compile_term(formula),
-        None if trigger is None else compile_term(trigger),
+        tuple(map(compile_term, triggers)),
         compile_counterexample(formula),
         tally,
         steps=steps,
@@ -396,7 +396,7 @@ def watching(
     if hidden := [setup.hidden[n] for n in names if n in setup.hidden]:
         tally.reason, tally.hidden = hidden[0], True
         return None
-    tally.triggered = watched.trigger is None
+    tally.conditions, tally.met = len(watched.triggers), 0
     every = watched.steps is not None and watched.steps.every
     triggers = triggers_of(setup, names, every=every)
     answers = any(n.startswith(f"{Role.OUTPUT}.") for n in triggers)

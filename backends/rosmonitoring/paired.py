@@ -50,7 +50,7 @@ class _Asked:
     watched: Watched
     rows: Ints
     held: Flags
-    met: Flags
+    met: Ints
     ends: Ints
     """For each answer, the row at which all its inputs are known; by latency the time, in nanoseconds."""
     ranges: dict[str, tuple[Ints, Ints]]
@@ -169,7 +169,7 @@ class Paired:
         ends = ids + self._jitter if latency else rows
         if latency:
             certain &= ends < self._times[self._listened[-1]]
-        asked = _Asked(watched, rows, certain, certain, ends, ranges)
+        asked = _Asked(watched, rows, certain, certain.astype(np.int64), ends, ranges)
         asked.take(certain)
         if not latency:
             for name, (first, _) in asked.ranges.items():
@@ -202,7 +202,7 @@ class Paired:
             certain &= (asked.ends - asked.rows) * max(1, len(self._watch.monitor.tallies)) < KEYS_KEPT
             for name, (first, _) in asked.ranges.items():
                 certain &= np.searchsorted(self._inputs[name].rows, asked.ends, "right") - 1 - first < KEYS_KEPT
-        asked.held, asked.met = np.ones(len(asked.rows), np.bool_), np.ones(len(asked.rows), np.bool_)
+        asked.held, asked.met = np.ones(len(asked.rows), np.bool_), np.full(len(asked.rows), -1)
         some_hold, some_fail = np.zeros(len(asked.rows), np.bool_), np.zeros(len(asked.rows), np.bool_)
         for number in range(int(cases[certain].max(initial=0))):
             some = np.flatnonzero(certain & (cases > number))
@@ -292,7 +292,7 @@ class Paired:
         tally = watched.tally
         held = asked.held[low:high]
         tally.judged += int(np.count_nonzero(held))
-        tally.triggered = tally.triggered or bool((asked.met[low:high] & held).any())
+        tally.met |= int(np.bitwise_or.reduce(asked.met[low:high][held]))
         if not held.all():
             tally.unsure(DEPENDS, len(held) - int(np.count_nonzero(held)))
         rows = asked.rows[low:high]

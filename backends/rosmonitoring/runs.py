@@ -244,4 +244,5 @@ def _judged(monitor: Monitor, name: str, seen: Iterable[Violation], unsaid: str)
     lost = tally.order + tally.partial + tally.forgotten + tally.nameless
     event, reason = first.index if first is not None else 0, unsaid or tally.reason
     held, broken, undecided = tally.decided - tally.broken, tally.broken - tally.excused, tally.undecided + lost
-    return Judged(held, broken, tally.excused, undecided, tally.triggered, shown, event, reason)
+    met = tuple(bool(tally.met >> k & 1) for k in range(tally.conditions))
+    return Judged(held, broken, tally.excused, undecided, met, shown, event, reason)

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, replace
+from functools import cached_property, reduce
+from operator import or_
 
 from avow.base.verdict import Counterexample, Outcome, Verdict
 
@@ -69,7 +70,7 @@ class Shown:
         self.excused = sum(t.excused for t in tallies)
         self.open_ends = sum(t.open for t in tallies)
         self.unpaired = any(t.unpaired for t in tallies)
-        self.vacuous = not any(t.triggered for t in tallies)
+        self.vacuous = not replace(tallies[0], met=reduce(or_, (t.met for t in tallies))).triggered
         self.reasons = list(dict.fromkeys(t.reason for t in tallies if t.reason))
         self.ages: dict[str, float] = {}
         for of, age in (each for t in tallies for each in t.ages.items()):
@@ -216,7 +217,7 @@ def _monitored(s: Shown) -> Answer:
         (s.decided < s.asked or s.decided < s.published, f" ({s.lacking})"),
         (s.unanswered, f"; {s.unanswered} inputs without an answer"),
         (s.open_ends, f"; what it demands was open at the end of {s.open_ends} of {len(s.runs)} traces"),
-        (s.vacuous, "; but its antecedent was never met"),
+        (s.vacuous, "; but a condition of it was never met"),
         (s.vacuous and s.wanted, f" by an answer that was decided: {s.wanted}"),
     )
     text = (held if s.excused else s.held) + "".join(text for applies, text in parts if applies)

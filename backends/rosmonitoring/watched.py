@@ -13,6 +13,8 @@ from avow.base.suggestions import nearest
 from avow.base.tuning.effort import JUDGE_EFFORT
 from avow.evaluation.evaluate import NotEvaluable
 from avow.evaluation.truth import judge, judge_open
+from avow.formulas.conditions import conditions
+from avow.formulas.formula import conjunction
 from avow.formulas.values import Value, show
 from avow.language.contract import Clause
 from avow.language.printer import show_term
@@ -58,8 +60,10 @@ class Tally:
     """Inputs without an answer, although later ones had one."""
     published: int = 0
     """Answers: publications of its outputs, where those that make one answer count once."""
-    triggered: bool = False
-    """Its antecedent held at least once (or it has none)."""
+    conditions: int = 1
+    """The number of conditions under which it demands something; 0: it always does."""
+    met: int = 0
+    """A bit for each of them that was met at least once."""
 
     ages: dict[str, float] = field(default_factory=dict)
     """The greatest age of each input when an answer came, in seconds."""
@@ -72,6 +76,11 @@ class Tally:
     @property
     def decided(self) -> int:
         return self.judged - self.undecided
+
+    @property
+    def triggered(self) -> bool:
+        """Whether each of its conditions was met at least once."""
+        return self.met + 1 == 1 << self.conditions
 
     @property
     def asked(self) -> int:
@@ -237,7 +246,7 @@ class Watched:
     clause: Clause
     names: tuple[str, ...]
     holds: Callable[[Mapping[str, Value]], Value]
-    trigger: Callable[[Mapping[str, Value]], Value] | None
+    triggers: tuple[Callable[[Mapping[str, Value]], Value], ...]
     witness: Callable[[Mapping[str, Value]], dict[str, Value] | None]
     tally: Tally
     outputs: frozenset[str] = frozenset()
@@ -278,21 +287,15 @@ class Watched:
                 self.tally.reason = (self.steps.unknown if self.steps is not None else "") or error.reason
             return answer
 
-    def triggered(self, values: Mapping[str, Value]) -> bool:
-        """Whether the antecedent is known to be met."""
-        try:
-            return self.trigger is None or bool(self.trigger(values))
-        except NotEvaluable:
-            return False
-
-    def note_trigger(self, values: Mapping[str, Value]) -> None:
-        """If the antecedent cannot be evaluated, it counts as met."""
-        if self.tally.triggered or self.trigger is None:
-            return
-        try:
-            self.tally.triggered = bool(self.trigger(values))
-        except NotEvaluable:
-            self.tally.triggered = True
+    def met(self, values: Mapping[str, Value], unknown: bool = False) -> int:
+        """A bit for each condition that is known to be met (if `unknown`: or that cannot be evaluated)."""
+        found = 0
+        for k, trigger in enumerate(self.triggers):
+            try:
+                found |= bool(trigger(values)) << k
+            except NotEvaluable:
+                found |= unknown << k
+        return found
 
     def only_supposed(self) -> None:
         """No message ever gave the value of the step before: its initial value is no observation."""
@@ -300,18 +303,24 @@ class Watched:
         held = tally.decided - tally.broken
         tally.supposed += held
         tally.judged -= held
-        tally.triggered = self.trigger is None
+        tally.met = 0
 
 
-def trigger_of(formula: Term) -> Term | None:
-    """The condition under which the formula is not vacuous: the antecedent, over all its variables, or None."""
+def conditions_of(formula: Term) -> tuple[Term, ...]:
+    """The conditions without each of which the formula is vacuous, over all its variables: its antecedents, with each
+    condition under which the rest demands something. None if it always demands something."""
     variables: list[Variable] = []
-    while isinstance(formula, Quantified) and formula.quantifier is Quantifier.FORALL:
-        variables.extend(formula.variables)
-        formula = formula.body
-    if not isinstance(formula, Implies):
-        return None
-    return Quantified(Quantifier.EXISTS, tuple(variables), formula.left) if variables else formula.left
+    given: list[Term] = []
+    while isinstance(formula, Implies) or (isinstance(formula, Quantified) and formula.quantifier is Quantifier.FORALL):
+        if isinstance(formula, Quantified):
+            variables.extend(formula.variables)
+            formula = formula.body
+        else:
+            given.append(formula.left)
+            formula = formula.right
+    ways = [conjunction((*given, condition.formula)) for condition in conditions(formula)]
+    ways = ways or ([conjunction(given)] if given else [])
+    return tuple(Quantified(Quantifier.EXISTS, tuple(variables), way) if variables else way for way in ways)
 
 
 def time_text(raw: Any) -> str:

@@ -69,6 +69,17 @@ def test_messages_without_an_answer_are_counted(tmp_path: Path, text: str, some_
     assert ("messages without an answer" in found.summary) is some_missing
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "formula", ["in.r < 300 or out.status == red", "(in.r >= 300 -> out.status == red) and out.status in {green, red}"]
+)
+def test_a_class_that_never_answers_a_condition_is_not_tested(tmp_path: Path, formula: str) -> None:
+    text = DIRECT.replace("self.said.publish(self.level)", "message.data >= 300 or self.said.publish(self.level)")
+    contract = CONTRACT.replace("guarantee high", f"guarantee silent ( {formula} )\n  guarantee high")
+    found = asked(job(tmp_path / "w", "rospy", text, "{cases: 300}", contract))["silent"]
+    assert (found.verdict, found.vacuous) == (Verdict.UNKNOWN, True), found.summary
+
+
 MUTANTS = {
     "strict": (">= self.red", "> self.red"),
     "one double off": (">= self.red", ">= self.red + 3e-14"),

@@ -64,6 +64,31 @@ def test_the_good_run_is_evidence(make_system: Make, tmp_path: Path) -> None:
     assert judged(make_system, tmp_path, ONE, events(*GOOD)).verdict is Verdict.MONITORED
 
 
+NEVER_HIGH = (
+    "in.r < 120 or out.v == 0",
+    "not (in.r >= 120 and out.v != 0)",
+    "if in.r >= 120 then out.v == 0 else TRUE",
+    "in.r > 0 -> in.r >= 120 -> out.v == 0",
+    "(in.r >= 120 -> out.v == 0) and (in.r < 50 -> out.v >= 0)",
+    "forall(k in {130, 140} | in.r == k -> out.v == 0)",
+    "in.r >= 120 <=> out.v == 0",
+    "not once(in.r >= 120) or out.v == 0",
+)
+
+
+@pytest.mark.parametrize("by", ["arrival", "stamp"])
+@pytest.mark.parametrize("formula", NEVER_HIGH)
+def test_what_never_met_a_condition_is_vacuous_however_it_is_written(
+    make_system: Make, tmp_path: Path, formula: str, by: str
+) -> None:
+    rcl, low, high = ONE.replace("in.r >= 120 -> out.v == 0", formula), (("r", 1.0), ("v", 5.0)) * 30, GOOD
+    for trace, vacuous in ((low, True), (low + high, False)):
+        told = judged(
+            make_system, tmp_path, rcl, events(*trace), answers={"by": by, "because": "one process writes it"}
+        )
+        assert (told.verdict, told.vacuous) == (Verdict.MONITORED, vacuous), told.summary
+
+
 @pytest.mark.parametrize("rule", [{"initial": 130}, {"initial": 130, "topic": "elsewhere"}])
 def test_an_initial_value_is_no_observation(make_system: Make, tmp_path: Path, rule: dict[str, Any]) -> None:
     trace = events(*[("v", 0.0)] * 30)

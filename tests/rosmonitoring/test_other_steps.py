@@ -199,7 +199,7 @@ PROMPT = "guarantee prompt ( in.a -> within[2 steps](out.b) )"
         ([(True, 0, False), (False, 0, True), (False, 0, False)], Verdict.MONITORED, "held at all 3 judgements"),
         ([(True, 0, False), (False, 0, False), (False, 0, False)], Verdict.REFUTED, "broken at event 6"),
         ([(True, 0, True), (False, 0, False), (True, 0, False)], Verdict.MONITORED, "open at the end of 1 of 1 traces"),
-        ([(False, 0, False), (True, 0, False)], Verdict.MONITORED, "antecedent was never met"),
+        ([(False, 0, False), (True, 0, False)], Verdict.MONITORED, "condition of it was never met"),
     ],
 )
 def test_evidence(told: Any, verdict: Verdict, said: str, make_system: Make, tmp_path: Path) -> None:
@@ -328,4 +328,4 @@ def test_a_breach_is_told_in_the_words_of_the_contract(make_system: Make, tmp_pa
     trace.write_text("".join(json.dumps(event) + "\n" for event in events_of(run)))
     done = CliRunner().invoke(command, [str(system.plan.root), str(trace)])
     assert "broken" in done.output
-    assert "antecedent was never met" not in done.output
+    assert "condition of it was never met" not in done.output

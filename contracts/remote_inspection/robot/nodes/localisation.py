@@ -13,7 +13,9 @@ class Localisation:
     def step(self, sensors):
         x, y = sensors
         if not (math.isfinite(x) and math.isfinite(y)):
-            return {"position": self.held}  # what is no number is no estimate; nothing is published before the first one
+            return {
+                "position": self.held
+            }  # what is no number is no estimate; nothing is published before the first one
         if self.held is None or math.hypot(x - self.held[0], y - self.held[1]) > self.noise:
             self.held = (x, y)
         return {"position": self.held}
