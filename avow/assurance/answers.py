@@ -12,6 +12,7 @@ from dataclasses import field
 from enum import StrEnum
 
 from avow.base.codec import LATER
+from avow.base.plain import count
 from avow.base.records import dataclass
 from avow.system.statements import GENERAL
 
@@ -197,7 +198,7 @@ class WeakestEvidence:
     @property
     def others(self) -> str:
         """The text after the requirements that need it: why more of them name the same node."""
-        return f"; {self.beside} on other guarantees of this node" if self.beside else ""
+        return f"; {count(self.beside, 'other requirement')} on other guarantees of this node" if self.beside else ""
 
 
 @dataclass(frozen=True, slots=True)

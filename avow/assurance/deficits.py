@@ -29,6 +29,7 @@ _WORDS = {
     "nan": ("claim{s} broken by NaN or infinity", "broken by NaN", "The contract is about numbers only."),
     "read": ("guarantee{s} on a person's reading only", "only read", "No tool has looked at them."),
     "single": ("guarantee{s} with one method only", "by one method", "An error of that tool would not be noticed."),
+    "idle": ("guarantee{s} that serve no requirement", "serving none", "No requirement needs them."),
     "tied": (
         "guarantee{s} translated by a person for the tool",
         "translated by a person",
@@ -93,6 +94,7 @@ def deficits(
         "nan": [v.id for v in leaves if any(e.entry.evidence.details.get("no numbers") for e in v.counting)],
         "read": [v.id for v in guarantees if _status(v, relied) is Status.REVIEWED],
         "single": list(single),
+        "idle": [v.id for v in guarantees if requirements and not any(v.id in r.closure for r in requirements)],
         "tied": [v.id for v in guarantees if v.id in relied and _by_hand(v, relied[v.id])],
         "unrun": [f"{v.id}: {method}" for v, method in unrun],
         "programs": [v.id for v in programs],

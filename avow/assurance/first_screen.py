@@ -136,7 +136,7 @@ def answers(
         by_node.setdefault(view.obligation.node, []).append(view)
     ranked = [_basis(node, by_node[node.name], relied) for node in nodes]
     basis = [b for b, _ in (sorted(ranked, key=lambda pair: pair[1]) if len(ranked) > NODES else ranked)]
-    owned = sum(bool(s.who and s.until) for s in assumptions)
+    owned = sum(s.owned for s in assumptions)
     return Answers(
         headline=headline,
         verdict=verdict,
@@ -150,7 +150,11 @@ def answers(
         bases=tuple(sorted(basis, key=lambda b: b.node)),
         more_nodes=f"and {count(len(basis) - NODES, 'node')} on no less" if len(basis) > NODES else "",
         weakest=weakest,
-        next_weakest=f"{following.title}: “{following.quote}”: {following.words}" if following else "",
+        next_weakest=(
+            f"{following.title}: “{following.quote}”: {following.words}"
+            if following and following.status not in EXHAUSTIVE
+            else ""
+        ),
         refuted=_refuted(requirements, views, nodes),
         supposed=tuple(_lines(assumptions)),
         owned=f"{owned} of {len(assumptions)}" if assumptions else "",

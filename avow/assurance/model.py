@@ -265,9 +265,10 @@ class RequirementView:
 
     @property
     def noted(self) -> str:
-        """The text beside its level: how often it may fail, and how far it was searched."""
-        bounds = self.searched or ("within bounds" if self.bounded else "")
-        parts = (self.rate.brief if self.rate and self.rate.bound else "", bounds)
+        """The text beside its level: how often it may fail, how far it was searched, why it is not green."""
+        why = "within bounds" if self.bounded else "an assumption has no owner or end"
+        amber = self.bounded or (self.level is Level.SHOWN and self.tone is Tone.AMBER)
+        parts = (self.rate.brief if self.rate and self.rate.bound else "", self.searched or why * amber)
         return "; ".join(part for part in parts if part) if self.level.holds else ""
 
     @property
@@ -277,8 +278,7 @@ class RequirementView:
     @property
     def awaits_validation(self) -> bool:
         """Whether only a person's validation of the sentence against the formula is missing."""
-        fails = self.failing or self.unknown_names or self.expired
-        return not (self.level.holds or fails) and self.status.supports
+        return not (self.level.holds or self.failing or self.unknown_names or self.expired) and self.status.supports
 
     @property
     def words(self) -> str:

@@ -103,10 +103,11 @@ def trace(case: Case) -> tuple[Row, ...]:
     for view in case.guarantees:
         if view.id not in reached:
             rows += _rows(view, "", "orphan: serves no requirement")
+    used = {name for r in case.requirements for name in r.closure}
     rows += [
         Row(derivation=d.derivation.name, status=d.status.value, remark="orphan: serves no requirement")
         for claim, d in derivations.items()
-        if claim not in reached
+        if claim not in reached and used.isdisjoint(d.rests_on)
     ]
     rows += [
         Row(

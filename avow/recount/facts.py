@@ -71,9 +71,6 @@ class Facts:
     def owned_ones(self) -> list[Json]:
         return [a for a in self.assumptions if a["who"] and (a["until"] or a["sort"] == "meaning")]
 
-    def owned(self) -> int:
-        return sum(bool(a["until"]) for a in self.owned_ones())
-
     def numbers(self, sort: str) -> list[int]:
         return [int(a["number"][1:]) for a in self.assumptions if a["sort"] == sort]
 
@@ -133,6 +130,9 @@ class Facts:
             "unanswered": sum(any(r["bound"].get("unanswered") for r in records(v)) for v in (*within, *own)),
             "nan": sum(any(r["details"].get("no numbers") for r in records(v)) for v in (*within, *own)),
             "withdrawn": sum(i["kind"] == "withdrawn" for i in self.case["open_items"]),
+            "idle": sum(
+                bool(self.requirements) and not any(_id(v) in r["closure"] for r in self.requirements) for v in within
+            ),
             "unrun": sum(_silent(v, method) for v in within for method, _ in v["planned"]),
             "programs": sum(v["obligation"]["kind"] == "program" and v["status"] == "not-run" for v in self.views),
             "conditional": sum(any(support(r) == "reviewed" and r["hypotheses"] for r in records(v)) for v in within),

@@ -21,6 +21,7 @@ from avow.evidence.record import Evidence
 from avow.evidence.status import Status, weigh
 from avow.report import wording
 from avow.report.bowtie import bowtie
+from avow.report.goals import doubts
 from avow.report.modules import NodeModule, RequirementModule, node_modules, requirement_modules
 from avow.report.page import asset, environment, known_pages, svg_image
 
@@ -65,6 +66,7 @@ def render_argument(case: Case, json_digest: str = "") -> str:
         "argument.html.j2",
         case,
         json_digest,
+        doubts=doubts(case),
         full_reason=full_reason,
         kept_apart=kept_apart,
         shade=shade,

@@ -7,6 +7,7 @@ solution has an assurance claim point: why the evidence may be believed, and wha
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import field, replace
 from enum import StrEnum
@@ -15,6 +16,8 @@ from avow.assurance.certification import ProofGrade
 from avow.assurance.model import Case, EvidenceView, ObligationView
 from avow.assurance.naming import is_foundation
 from avow.assurance.relied import agrees, upper_bound
+from avow.base.packaged import packaged
+from avow.base.plain import count, listed
 from avow.base.records import dataclass
 from avow.base.remembered import by_identity
 from avow.base.verdict import Link, Object
@@ -23,7 +26,11 @@ from avow.evidence.record import Evidence
 from avow.evidence.status import Status, weigh
 from avow.report import wording
 from avow.report.modules import RequirementModule, node_modules, requirement_modules
-from avow.report.qualification import independence
+from avow.report.qualification import DATA, independence
+
+_CERTIFIED = (ProofGrade.CERTIFIED_1, ProofGrade.CERTIFIED_2)
+_SEEDED = frozenset(packaged("avow.report", DATA)["seeded"])
+"""The backends whose conformance tests have seeded faults."""
 
 
 class Sort(StrEnum):
@@ -112,14 +119,16 @@ class _Argument:
         self.top = self.new(Sort.GOAL)
         self.requirements = {r.id: self.new(Sort.GOAL) for r in case.requirements}
         self.nodes = {node.name: self.new(Sort.GOAL) for node in case.nodes}
-        self.guarantees = {view.id: self.new(Sort.GOAL) for view in case.guarantees}
+        shared = (v for v in case.obligations if v.obligation.kind in (Kind.GUARANTEE, Kind.COMPOSITION))
+        self.goals = {view.id: self.new(Sort.GOAL) for view in shared}
 
     def new(self, sort: Sort) -> str:
         self.last[sort] += 1
         return f"{sort}{self.last[sort]}"
 
     def modules(self) -> Iterator[Module]:
-        general = [module for module in (self.validation(), self.models(), self.contracts(), self.tools()) if module]
+        asked = (self.validation(), self.composition(), self.models(), self.contracts(), self.tools())
+        general = [module for module in asked if module]
         hazards = self.hazards()
         yield self.whole([*general, *([hazards] if hazards else [])])
         yield from map(self.requirement, self.requirement_modules)
@@ -142,7 +151,8 @@ class _Argument:
         if others:
             text, below = "Argument over what the evidence takes for granted", tuple(m.elements[0].name for m in others)
             strategies.append(Element(self.new(Sort.STRATEGY), Sort.STRATEGY, text, below))
-        proposition = f"Each requirement of {case.title} holds as far as its row says"
+        given = f", given assumptions A1 to A{len(assumptions)}" if assumptions else ""
+        proposition = f"{case.title} meets {count(len(self.requirements), 'requirement')}{given}"
         top = Element(
             self.top,
             Sort.GOAL,
@@ -162,11 +172,8 @@ class _Argument:
             context.append(Element(self.new(Sort.CONTEXT), Sort.CONTEXT, r.formal, label="Formula"))
         if r.source:
             context.append(Element(self.new(Sort.CONTEXT), Sort.CONTEXT, r.source, label="Source"))
-        if module.conditions:
-            text = f"Composition: {module.conditions}"
-            context.append(Element(self.new(Sort.JUSTIFICATION), Sort.JUSTIFICATION, text))
         solutions = [s for name in r.obligations if name in self.views for s in self.solutions(self.views[name])]
-        below = tuple(self.nodes[node] for node, _, _ in module.away)
+        below = tuple(self.goals[name] for name in r.closure if name in self.goals)
         strategy = Element(self.new(Sort.STRATEGY), Sort.STRATEGY, module.strategy, below)
         supported = (*([strategy.name] if below else []), *(s.name for s in solutions))
         goal = Element(
@@ -224,9 +231,21 @@ class _Argument:
             return None
         linked = [v for v in self.links if v.obligation.node in of_models]
         goals, solutions = self.claims(linked)
+        for node in sorted(of_models - {v.obligation.node for v in linked}):
+            text = f"The model of {node} that was verified behaves as its program"
+            label = f"{node} [{Status.MISSING}]"
+            goals.append(Element(self.new(Sort.GOAL), Sort.GOAL, text, undeveloped=True, unsupported=True, label=label))
         whole = all(self.linked(v, r) for v in self.case.guarantees for r in v.records if r.of is Object.MODEL)
         text = "Each model that was verified behaves as the program that runs"
         return self.general("model-fidelity", text, [*goals, *solutions], whole, goals)
+
+    def composition(self) -> Module | None:
+        """Whether the contracts fit together: the conditions that requirements share."""
+        views = [v for v in self.case.obligations if v.obligation.kind is Kind.COMPOSITION]
+        goals, solutions = self.claims(views)
+        good = all(v.standing.supports for v in views)
+        text = "The nodes' contracts fit together: each condition of the composition holds"
+        return self.general("composition", text, [*goals, *solutions], good, goals) if views else None
 
     def contracts(self) -> Module | None:
         """Whether contracts are worth verifying: consistent, realizable, not vacuous."""
@@ -269,7 +288,7 @@ class _Argument:
                 Element(
                     self.new(Sort.GOAL),
                     Sort.GOAL,
-                    f"The hazard is mitigated: {hazard.text}",
+                    f"The hazard “{hazard.text}” is mitigated",
                     tuple(dict.fromkeys(below)),
                     undeveloped=not below,
                     unsupported=not view.level.holds,
@@ -284,7 +303,7 @@ class _Argument:
             return self.requirements[name]
         if name in self.nodes:
             return self.nodes[name]
-        return next((self.guarantees[claim] for claim in claims if claim in self.guarantees), None)
+        return next((self.goals[claim] for claim in claims if claim in self.goals), None)
 
     def general(
         self, name: str, text: str, elements: Sequence[Element], whole: bool, goals: Sequence[Element] | None = None
@@ -301,7 +320,7 @@ class _Argument:
         for view in views:
             found = list(self.solutions(view))
             solutions += found
-            of, own = view.obligation, self.guarantees.get(view.id)
+            of, own = view.obligation, self.goals.get(view.id)
             goals.append(
                 Element(
                     own or self.new(Sort.GOAL),
@@ -354,8 +373,9 @@ class _Argument:
         record = item.entry.evidence
         status, promised = weigh(record).status, view.obligation.kind is Kind.GUARANTEE
         if record.link is not Link.GUIDED:
-            seeded = "the backend's conformance tests catch seeded faults"
-            yield Defeater("the translation or the reading of the tool's answer is wrong", seeded)
+            again = "the kernel established it again" if self.grades.get(view.id) in _CERTIFIED else ""
+            tried = "the backend's conformance tests catch seeded faults" if record.backend in _SEEDED else again
+            yield Defeater("the translation or the reading of the tool's answer is wrong", tried)
         if status is Status.REVIEWED:
             several = len(independence(view).persons) > 1
             yield Defeater("the reviewer overlooked a fault", "several persons reviewed it" if several else "")
@@ -373,16 +393,23 @@ class _Argument:
         if promised and status in (Status.PROVED, Status.CHECKED) and record.of is Object.MODEL:
             yield Defeater("the model differs from the program that runs", self.linked(view, record))
         if status in (Status.TESTED, Status.MONITORED):
-            known = upper_bound(record) is not None
-            yield Defeater("a case that was not tried fails", wording.bound_text(record.bound) if known else "")
+            within = f" ({wording.bound_text(record.bound)})" if upper_bound(record) is not None else ""
+            yield Defeater(f"a case that was not tried fails{within}", "")
         if status is Status.PROVED:
             twice = self.grades.get(view.id) is ProofGrade.CERTIFIED_2
-            other = "a method with another tool supports the claim" if independence(view).tools > 1 else ""
-            yield Defeater("the solver is wrong", "two solvers answered each question" if twice else other)
+            yield Defeater("the solver is wrong", "two solvers answered each question" if twice else "")
 
     def linked(self, view: ObligationView, record: Evidence) -> str:
         found = agrees(self.links, view.obligation, record.method)
         return f"the program agrees with it: {found}" if found is not None and found.supports else ""
+
+
+def doubts(case: Case) -> list[tuple[str, int, int, str]]:
+    """(doubt, how many pieces of evidence it is about, of how many it is open, the answers to the others)."""
+    found: dict[str, Counter[str]] = {}
+    for doubt in (d for module in argument(case) for element in module.elements for d in element.defeaters):
+        found.setdefault(doubt.text.partition(" (")[0], Counter())[doubt.answer] += 1
+    return [(text, answers.total(), answers.pop("", 0), listed(list(answers), 3)) for text, answers in found.items()]
 
 
 def by_name(modules: Iterable[Module]) -> Mapping[str, Element]:

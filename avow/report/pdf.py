@@ -97,11 +97,7 @@ def _data(case: Case) -> dict[str, Any]:
         "hazards": hazard_rows(case),
         "no_hazard": NO_HAZARD,
         "gates": [
-            {
-                "title": g.title,
-                "reason": g.reason,
-                "status": {"word": g.state, "tone": _GATES.get(g.state, "plain")},
-            }
+            {"title": g.title, "reason": g.reason, "status": {"word": g.state, "tone": _GATES.get(g.state, "plain")}}
             for g in case.gates
         ],
         "open": [
@@ -218,7 +214,7 @@ def _supposed(case: Case, line: SupposedLine) -> tuple[str, str]:
 
 def _owned(case: Case) -> str:
     a = case.answers
-    return f"{a.owned} with owner and last day{a.owners and ': '}{a.owners}." if a.owned else "Nothing."
+    return f"{a.owned} with an owner and an end{a.owners and ': '}{a.owners}." if a.owned else "Nothing."
 
 
 def _weakest(case: Case) -> str:

@@ -30,7 +30,7 @@ def terminal_lines(case: Case) -> list[str]:
     more = f"; and {len(a.bases) - len(shown)} more nodes" if len(a.bases) > len(shown) else ""
     lines += ["2 Based on", *_cut_lines("; ".join(f"{b.title} {b.words}" for b in shown) + more, 2)]
     lines += ["3 Weakest evidence", *_cut_lines(_weakest_words(case), 3)]
-    lines += [f"4 Assumed{f' ({a.owned} with owner and last day)' if a.owned else ': nothing'}"]
+    lines += [f"4 Assumed{f' ({a.owned} with an owner and an end)' if a.owned else ': nothing'}"]
     lines += [_cut(f"  {line.about}: {line.says}") for line in a.supposed]
     head = f" {a.changed_against[:1].lower()}{a.changed_against[1:]}"
     lines += [_cut(f"5 Changed{head.removesuffix(':')}")]
@@ -90,7 +90,7 @@ def markdown_head(case: Case) -> Iterator[str]:
     yield escaped(_weakest_words(case))
     yield "## 4 What is assumed, not shown?"
     owners = f": {escaped(a.owners)}" if a.owners else ""
-    owned = f"{a.owned} with owner and last day{owners}.\n\n" if a.owned else ""
+    owned = f"{a.owned} with an owner and an end{owners}.\n\n" if a.owned else ""
     yield owned + (
         "\n".join(f"- {s.number} ({ABOUT[s.sort]}) {escaped(s.words)}; {escaped(s.term)}" for s in case.assumptions)
         or "Nothing."

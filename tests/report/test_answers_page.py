@@ -251,5 +251,5 @@ def test_what_evidence_supposes_is_told_whether_or_not_a_requirement_needs_it(re
     assert "guarantees only" in page
     assert "inputs are finite" in str(pdf_data(found))
     (line,) = [line for line in terminal_lines(found) if line.startswith("4 Assumed")]
-    assert line == f"4 Assumed ({found.answers.owned} with owner and last day)"
+    assert line == f"4 Assumed ({found.answers.owned} with an owner and an end)"
     assert "Nothing." not in "\n".join(markdown_head(found)).split("## 4")[1].split("## 5")[0]

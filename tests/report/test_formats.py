@@ -287,6 +287,11 @@ def test_a_path_goes_through_the_derivation() -> None:
         "rover/system/composition/D1-position",
         "rover/localisation/guarantee/one_position",
     }
+    found = rover_case()
+    alone = replace(found.requirements[0], rests_on=())  # it reaches the derivation's conditions, not its name
+    told = {r.derivation for r in trace(replace(found, requirements=(alone,))) if "serves no requirement" in r.remark}
+    assert "D1" not in told
+    assert "D1" in {r.derivation for r in trace(replace(found, requirements=())) if "serves no" in r.remark}
 
 
 def test_what_a_guarantee_rests_on_is_part_of_the_trace() -> None:
