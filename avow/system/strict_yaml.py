@@ -1,7 +1,7 @@
 """Strict YAML for configuration: every piece keeps its place, nothing is guessed.
 
 `yaml.safe_load` accepts duplicate keys silently, reads ``off`` as False, ``1:30`` as 90 and ``010`` as 8, expands
-aliases without bound, and loses positions. This reader works on PyYAML's parse events: scalars are null, true, false,
+aliases without bound, and loses positions. This reader works on PyYAML's nodes: scalars are null, true, false,
 JSON numbers or text; duplicate keys, tags and merge keys are errors; aliases may be used, within bounds.
 """
 
@@ -18,7 +18,6 @@ import yaml
 from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.base.plain import invisible
 from avow.base.records import dataclass
-from avow.base.suggestions import did_you_mean
 from avow.base.tuning.sizes import PLAN_BYTES, PLAN_DEPTH, PLAN_PIECES
 from avow.system.plan import Located
 
@@ -146,6 +145,13 @@ _PROBLEMS = (
         "the keys of a mapping, and the items of a list, stand in one column: move this line, or those above it",
     ),
     (r"expected ',' or '(.)'", "a `,` or the closing `{0}` is missing", None),
+    (r"found another document", "a second document; one file holds one", None),
+    (
+        r"found undefined alias '(.*)'",
+        "the alias `*{0}` is used before or without its anchor",
+        "write the value here, or its anchor above",
+    ),
+    ("second occurrence", "this anchor is given twice", "give one of them another name"),
     (r"unexpected end of stream|found document separator", "a quotation mark or a bracket is not closed", None),
     (
         r"unknown escape character '(.*)'",
@@ -182,129 +188,97 @@ def scalar(text: str) -> Any:
     return text
 
 
-@dataclass(slots=True)
-class _Frame:
-    piece: Piece
-    anchor: str | None
-    key: str | None = None
+class _Composer(yaml.SafeLoader):
+    """YAML's nodes; one without a tag in the text has an empty one."""
+
+    def resolve(self, kind: Any, value: Any, implicit: Any) -> Any:
+        return ""
 
 
 class _Builder:
-    """Builds pieces from events with a stack of its own: Python's recursion limit does not apply, only our own."""
+    """Pieces of a document's nodes. Each node has one piece, so that an alias has the place of its anchor."""
 
     def __init__(self, file: str) -> None:
         self.file = file
-        self.stack: list[_Frame] = []
-        self.anchors: dict[str, Piece] = {}
-        self.root: Piece | None = None
+        self.made: dict[yaml.Node, Piece | None] = {}
+        """None: it is being made, so that an alias in it would be without end."""
         self.problems: list[Diagnostic] = []
 
     def build(self, text: str) -> Piece:
-        documents = 0
-        for event in yaml.parse(text, Loader=yaml.SafeLoader):
-            match event:
-                case yaml.DocumentStartEvent():
-                    documents += 1
-                    if documents > 1:
-                        raise self.reject(event, "PLAN101", "a second document; one file holds one")
-                case yaml.ScalarEvent():
-                    self.refuse_tag(event)
-                    self.scalar(event)
-                case yaml.SequenceStartEvent() | yaml.MappingStartEvent():
-                    self.refuse_tag(event)
-                    self.open(event)
-                case yaml.SequenceEndEvent() | yaml.MappingEndEvent():
-                    self.close(event)
-                case yaml.AliasEvent():
-                    self.alias(event)
-        if self.root is None:
+        try:
+            root = yaml.compose(text, _Composer)
+        except RecursionError:
+            raise Rejected(_error(_TOO_DEEP, self.file, 1, 1)) from None
+        if root is None:
             raise Rejected(_error("the file is empty", self.file, 1, 1))
-        return self.root
+        return self.piece(root, 0)
 
-    def scalar(self, event: yaml.ScalarEvent) -> None:
-        text = str(event.value)
-        plain = event.style is None
-        if unseen := invisible(text):
-            self.problem(event, "PLAN101", f"the text holds the invisible character {unseen}")
-        if self.wants_key():
-            self.key(event, text)
-            return
-        piece = Piece(self.span(event), scalar(text) if plain else text, text)
-        self.remember(event.anchor, piece)
-        self.put(event, piece)
+    def piece(self, node: yaml.Node, depth: int) -> Piece:
+        if node in self.made:
+            known = self.made[node]
+            if known is None:
+                raise self.reject(node, "PLAN101", "an alias stands in what it repeats")
+        else:
+            self.made[node] = None
+            if node.tag:
+                self.problem(node, "PLAN101", f"the tag {node.tag} is not read; write plain values")
+            known = self.made[node] = self.new(node, depth)
+        if depth + known.depth > PLAN_DEPTH:
+            raise self.reject(node, "PLAN101", _TOO_DEEP)
+        return known
 
-    def open(self, event: Any) -> None:
-        if self.wants_key():
-            raise self.reject(event, "PLAN102", "a key must be plain text")
-        if len(self.stack) >= PLAN_DEPTH:
-            raise self.reject(event, "PLAN101", f"nested deeper than {PLAN_DEPTH} levels")
-        mapping = isinstance(event, yaml.MappingStartEvent)
-        piece = Piece(self.span(event), items=None if mapping else [], entries={} if mapping else None)
-        self.stack.append(_Frame(piece, event.anchor))
+    def new(self, node: yaml.Node, depth: int) -> Piece:
+        if isinstance(node, yaml.ScalarNode):
+            text = self.text(node)
+            return Piece(self.span(node), scalar(text) if node.style is None else text, text)
+        if depth >= PLAN_DEPTH:
+            raise self.reject(node, "PLAN101", _TOO_DEEP)
+        found = Piece(self.span(node))
+        if isinstance(node, yaml.MappingNode):
+            found.entries = {}
+            for key, value in node.value:
+                found.entries[self.key(key, found)] = self.grown(found, value, depth)
+        else:
+            found.items = [self.grown(found, value, depth) for value in node.value]
+        return found
 
-    def close(self, event: Any) -> None:
-        frame = self.stack.pop()
-        end = self.span(event)
-        start = frame.piece.span
-        frame.piece.span = Span(self.file, start.line, start.column, end.end_line, end.end_column)
-        self.remember(frame.anchor, frame.piece)
-        self.put(event, frame.piece)
+    def grown(self, whole: Piece, node: yaml.Node, depth: int) -> Piece:
+        part = self.piece(node, depth + 1)
+        whole.depth = max(whole.depth, part.depth + 1)
+        whole.size += part.size
+        if whole.size > PLAN_PIECES:
+            raise self.reject(node, "PLAN101", f"more than {PLAN_PIECES} pieces once its aliases are expanded")
+        return part
 
-    def alias(self, event: Any) -> None:
-        if self.wants_key():
-            raise self.reject(event, "PLAN102", "a key must be plain text")
-        piece = self.anchors.get(event.anchor)
-        if piece is None:
-            near = did_you_mean(event.anchor, self.anchors)
-            hint = near or f"write the value here, or `&{event.anchor}` before it above"
-            raise self.reject(event, "PLAN101", f"the alias *{event.anchor} is used before or without its anchor", hint)
-        self.put(event, piece)
-
-    def remember(self, anchor: str | None, piece: Piece) -> None:
-        if anchor is not None:
-            self.anchors[anchor] = piece
-
-    def wants_key(self) -> bool:
-        return bool(self.stack) and self.stack[-1].piece.entries is not None and self.stack[-1].key is None
-
-    def key(self, event: Any, key: str) -> None:
-        frame = self.stack[-1]
-        frame.key = key
+    def key(self, node: yaml.Node, whole: Piece) -> str:
+        if not isinstance(node, yaml.ScalarNode):
+            raise self.reject(node, "PLAN102", "a key must be plain text")
+        key = self.text(node)
         if key == "<<":
-            self.problem(event, "PLAN102", "merge keys (<<) are not read; write the keys out")
-        if (first := frame.piece.keys.setdefault(key, self.span(event))) != self.span(event):
-            self.problem(event, "PLAN102", f"the key {key!r} is given twice", ("first given here", first))
+            self.problem(node, "PLAN102", "merge keys (<<) are not read; write the keys out")
+        if key in whole.keys:
+            self.problem(node, "PLAN102", f"the key {key!r} is given twice", ("first given here", whole.keys[key]))
+        whole.keys.setdefault(key, self.span(node))
+        return key
 
-    def put(self, event: Any, piece: Piece) -> None:
-        if len(self.stack) + piece.depth > PLAN_DEPTH:
-            raise self.reject(event, "PLAN101", f"nested deeper than {PLAN_DEPTH} levels")
-        if not self.stack:
-            self.root = piece
-            return
-        frame = self.stack[-1]
-        frame.piece.depth = max(frame.piece.depth, piece.depth + 1)
-        if frame.piece.items is not None:
-            frame.piece.items.append(piece)
-        elif frame.piece.entries is not None and frame.key is not None:
-            frame.piece.entries[frame.key] = piece
-            frame.key = None
-        frame.piece.size += piece.size
-        if frame.piece.size > PLAN_PIECES:
-            raise self.reject(event, "PLAN101", f"more than {PLAN_PIECES} pieces once its aliases are expanded")
+    def text(self, node: yaml.ScalarNode) -> str:
+        text = str(node.value)
+        if unseen := invisible(text):
+            self.problem(node, "PLAN101", f"the text holds the invisible character {unseen}")
+        return text
 
-    def refuse_tag(self, event: Any) -> None:
-        if event.tag is not None:
-            self.problem(event, "PLAN101", f"the tag {event.tag} is not read; write plain values")
-
-    def span(self, event: Any) -> Span:
-        start, end = event.start_mark, event.end_mark
+    def span(self, node: yaml.Node) -> Span:
+        start, end = node.start_mark, node.end_mark
         return Span(self.file, start.line + 1, start.column + 1, end.line + 1, end.column + 1)
 
-    def problem(self, event: Any, code: str, message: str, *notes: tuple[str, Span | None]) -> None:
-        self.problems.append(Diagnostic(code, message, self.span(event), notes=notes))
+    def problem(self, node: yaml.Node, code: str, message: str, *notes: tuple[str, Span | None]) -> None:
+        self.problems.append(Diagnostic(code, message, self.span(node), notes=notes))
 
-    def reject(self, event: Any, code: str, message: str, hint: str | None = None) -> Rejected:
-        return Rejected(Diagnostic(code, message, self.span(event), hint=hint))
+    def reject(self, node: yaml.Node, code: str, message: str) -> Rejected:
+        return Rejected(Diagnostic(code, message, self.span(node)))
+
+
+_TOO_DEEP = f"nested deeper than {PLAN_DEPTH} levels"
 
 
 def _places(piece: Piece, path: tuple[str | int, ...]) -> Iterator[tuple[tuple[str | int, ...], Span]]:
