@@ -1,14 +1,11 @@
-"""Queries to git about a folder that execute nothing from that folder.
-
-A repository's own settings name programs: filters for checkout and archive, hooks, pagers, remote helpers. So this
-module uses only commands that run none of them, and fetches nothing.
-"""
+"""Queries to git about a folder. They fetch nothing, and run no hook."""
 
 from __future__ import annotations
 
+import io
 import os
-import stat
 import subprocess
+import tarfile
 from pathlib import Path
 
 _ALONE = {"GIT_ALLOW_PROTOCOL": "none", "GIT_NO_LAZY_FETCH": "1", "GIT_OPTIONAL_LOCKS": "0", "GIT_TERMINAL_PROMPT": "0"}
@@ -30,36 +27,24 @@ def write_files(folder: Path, revision: str, part: str, target: Path) -> None:
     """The files of a revision under `part` of the folder, written below `target`. Raises GitFailed, OSError."""
     if revision.startswith("-"):
         raise GitFailed(f"{revision} is no revision")
-    listed = _ask(folder, "ls-tree", "-r", "-z", revision, part)
-    rows = [row.partition(b"\t") for row in listed.split(b"\0") if row]
-    found = [(about.split(), target / os.fsdecode(path)) for about, _, path in rows]
-    blobs = [(int(about[0], 8), about[2], path) for about, path in found if about[1] == b"blob"]
-    if any(".." in path.parts for _, _, path in blobs):
-        raise GitFailed(f"{revision} has files outside of its folder")
-    told = _ask(folder, "cat-file", "--batch", said=b"".join(digest + b"\n" for _, digest, _ in blobs))
-    contents: list[tuple[int, Path, bytes]] = []
-    for mode, _, path in blobs:
-        header, _, told = told.partition(b"\n")
-        if len(header.split()) != 3:
-            raise GitFailed(header.decode(errors="replace"))
-        size = int(header.split()[2])
-        contents.append((mode, path, told[:size]))
-        told = told[size + 1 :]
-    for mode, path, content in sorted(
-        contents, key=lambda c: stat.S_ISLNK(c[0])
-    ):  # through no link anything is written
-        path.parent.mkdir(parents=True, exist_ok=True)
-        if stat.S_ISLNK(mode):
-            path.symlink_to(os.fsdecode(content))
-        else:
-            path.write_bytes(content)
+    archive = _ask(folder, "archive", "--format=tar", revision, "--", part)
+    try:
+        with tarfile.open(fileobj=io.BytesIO(archive)) as files:
+            files.extractall(target, filter="data")
+    except tarfile.TarError as error:
+        raise GitFailed(f"{revision} cannot be written: {error}") from None
 
 
-def _ask(folder: Path, *words: str, said: bytes = b"", seconds: float = 60) -> bytes:
+def _ask(folder: Path, *words: str, seconds: float = 60) -> bytes:
     command = ["git", "-C", str(folder), *words]
     try:
         done = subprocess.run(
-            command, input=said, capture_output=True, timeout=seconds, check=False, env={**os.environ, **_ALONE}
+            command,
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            timeout=seconds,
+            check=False,
+            env={**os.environ, **_ALONE},
         )
     except (OSError, subprocess.TimeoutExpired) as error:
         raise GitFailed(f"git cannot be asked: {error}") from None

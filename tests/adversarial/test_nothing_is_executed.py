@@ -134,7 +134,8 @@ def test_the_language_server(place: Path) -> None:
 
 @pytest.mark.skipif(shutil.which("git") is None, reason="git is not on the PATH")
 def test_a_repository_with_programs_among_its_settings(tmp_path: Path) -> None:
-    """Filters for what is checked out or archived, hooks, what tells of changed files: none is executed."""
+    """Pagers, hooks, what tells of changed files: none is executed. A filter is the user's own setting: no clone has
+    it."""
     root = tmp_path / "theirs"
     folder = root / "contracts" / "s"
     folder.mkdir(parents=True)
@@ -151,15 +152,14 @@ def test_a_repository_with_programs_among_its_settings(tmp_path: Path) -> None:
     git("commit", "-qm", "first")
     program = f"sh -c 'echo $0 >> {root / 'executed'}; cat'"
     settings = {
-        'filter "evil"': ("smudge", "clean", "process"),
         "core": ("fsmonitor", "pager", "sshCommand", "editor"),
         'diff "evil"': ("textconv",),
     }
     with (root / ".git" / "config").open("a") as file:
         for part, names in settings.items():
             file.write("\n".join([f"[{part}]", *(f'{name} = "{program}"' for name in names), ""]))
-    assert git("config", "filter.evil.clean") == f"{program}\n".encode()
-    (root / ".git" / "info" / "attributes").write_text("* filter=evil diff=evil\n")
+    assert git("config", "diff.evil.textconv") == f"{program}\n".encode()
+    (root / ".git" / "info" / "attributes").write_text("* diff=evil\n")
     (folder / "s.rcl").write_text(RCL.replace("<= 1", "<= 2"))
     told = [avow(*words, cwd=root).stdout for words in (("diff", "HEAD"), ("report",))]
     assert "s/n/guarantee/g" in told[0], told
