@@ -28,17 +28,13 @@ if TYPE_CHECKING:
 @json_option("see docs/schemas/check.schema.json")
 @click.option("--sarif", is_flag=True, help="For machines: SARIF 2.1.0.")
 @click.option("--off", "off", multiple=True, metavar="CODE", help="A warning that is not wanted (may be repeated).")
-@click.option("--separately", is_flag=True, help="Each file is a contract of its own, also within one folder.")
 @click.option("--explain", is_flag=True, help="Below each kind of diagnostic found, what it means.")
-@click.option("--colour/--no-colour", default=None, help="By default, colour on a terminal.")
 def command(
     paths: tuple[Path, ...],
     as_json: bool,
     sarif: bool,
     off: tuple[str, ...],
-    separately: bool,
     explain: bool,
-    colour: bool | None,
 ) -> int:
     """Check contracts: syntax, names, types, and lints.
 
@@ -52,7 +48,7 @@ def command(
     files = 0
     folders = dict.fromkeys(path for path in paths if (path / "plan.yaml").is_file())
     shelves = {folder: _shelf(folder) for folder in folders}
-    for group, group_off in _groups(paths, separately, found):
+    for group, group_off in _groups(paths, found):
         from avow.language.load import check_paths
 
         files += len(group)
@@ -68,9 +64,8 @@ def command(
     elif sarif:
         click.echo(document(to_sarif(found, version=__version__, codes=_codes(found))))
     else:
-        tint = sys.stdout.isatty() if colour is None else colour
         if found:
-            click.echo(render(found, colour=tint), color=tint)
+            click.echo(render(found, colour=sys.stdout.isatty()))
         if explain:
             _explain(found)
         click.echo(f"{count(files, 'file')}: {summary(found)}")
@@ -93,9 +88,7 @@ def _codes(found: list[Diagnostic]) -> Mapping[str, Code]:
     return every_code()
 
 
-def _groups(
-    paths: tuple[Path, ...], separately: bool, found: list[Diagnostic]
-) -> list[tuple[list[Path], frozenset[str]]]:
+def _groups(paths: tuple[Path, ...], found: list[Diagnostic]) -> list[tuple[list[Path], frozenset[str]]]:
     """The contracts to check, each with its files and the lints that its plan switches off."""
     by_folder: dict[Path, list[Path]] = {}
     groups: list[tuple[list[Path], frozenset[str]]] = []
@@ -104,8 +97,6 @@ def _groups(
             groups.append(_system(path, found))
         elif path.suffix != ".rcl" and len(path.parts) == 1 and not path.exists():
             found.extend(_no_system(path))
-        elif separately:
-            groups.append(([path], _off(path.parent)))
         else:
             by_folder.setdefault(path.parent, []).append(path)
     groups += [(files, _off(folder)) for folder, files in by_folder.items()]

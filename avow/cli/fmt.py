@@ -21,9 +21,8 @@ if TYPE_CHECKING:
 @click.command()
 @click.argument("paths", metavar="SYSTEM...", nargs=-1, required=True, type=ContractArgument(allow_dash=True))
 @click.option("--check", is_flag=True, help="Change nothing; code 1 where a file is not in the canonical layout.")
-@click.option("--diff", is_flag=True, help="Change nothing; show what would change.")
 @json_option("which files are changed, or would be")
-def command(paths: tuple[Path, ...], check: bool, diff: bool, as_json: bool) -> int:
+def command(paths: tuple[Path, ...], check: bool, as_json: bool) -> int:
     """Put contracts into the canonical layout, in place. Comments are kept, and the meaning.
 
     Each SYSTEM is a system's name, a folder, an .rcl file, or - for the standard input. A file with a syntax error
@@ -49,17 +48,14 @@ def command(paths: tuple[Path, ...], check: bool, diff: bool, as_json: bool) -> 
         except Rejected as rejected:
             faults.extend(rejected.diagnostics)
             continue
-        if str(path) == "-" and not (check or diff or as_json):
+        if str(path) == "-" and not (check or as_json):
             click.echo(formatted, nl=False)
             continue
         before = source.text if str(path) == "-" else read_regular(path).decode("utf-8")
         if formatted == before:
             continue
         changed.append(printable(str(path)))
-        if diff:
-            if not as_json:
-                _show_diff(before, formatted, source.file)
-        elif check:
+        if check:
             if not as_json:
                 click.echo(f"{printable(str(path))} is not in the canonical layout")
         elif str(path) != "-":
@@ -73,19 +69,12 @@ def command(paths: tuple[Path, ...], check: bool, diff: bool, as_json: bool) -> 
             if not as_json:
                 click.echo(f"formatted {printable(str(path))}")
     if as_json:
-        told = {"changed": changed, "written": not (check or diff), "faults": shown(faults).diagnostics}
+        told = {"changed": changed, "written": not check, "faults": shown(faults).diagnostics}
         click.echo(document(told))
     if faults:
         click.echo(render(faults), err=True)
         return 2
-    return 1 if changed and (check or diff) else 0
-
-
-def _show_diff(before: str, after: str, file: str) -> None:
-    import difflib
-
-    lines = difflib.unified_diff(before.splitlines(True), after.splitlines(True), file, f"{file} (formatted)")
-    click.echo("".join(lines), nl=False)
+    return 1 if changed and check else 0
 
 
 def _files(paths: tuple[Path, ...], faults: list[Diagnostic]) -> list[Path]:

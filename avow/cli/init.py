@@ -15,34 +15,9 @@ from avow.base.workspace import find_workspace
 from avow.cli.options import PathArgument, json_option
 from avow.ros.sources import DISTRIBUTIONS
 
-_DODO = '''"""The pipeline as doit tasks: `doit verify` does everything for every system under contracts/."""
-
-import sys
-from pathlib import Path
-
-if (here := Path(__file__).resolve().parent) in map(Path.resolve, map(Path, sys.path[:2])):
-    # put there by doit and by `python -m`: no module of this folder is to stand in for one of Avow's
-    sys.path[:2] = [place for place in sys.path[:2] if Path(place).resolve() != here]
-
-from avow.pipeline.tasks import Pipeline
-
-RUN = Pipeline(Path(__file__).parent, sys.argv[1:])
-DOIT_CONFIG = RUN.config()
-
-
-def task_avow():
-    """all stages from check to verify, for each system, node and method"""
-    yield from RUN.tasks()
-'''
-
-
-_MONITOR = """\
-      - rosmonitoring:                 # a recorded run; `avow monitor --help` tells how to make one of a bag
-          ros_version: {}
-          traces: [traces/morning.jsonl]
-          answers: {{by: arrival, because: "written by one process, each answer after its input"}}
-          mapping: {{in.temperature: data, out.mode: data}}
-"""
+_TEMPLATES = Path(str(resources.files("avow.cli")))
+_PARTS = ("gitignore.txt", "dodo.txt", "monitor.txt")
+"""Files of the templates that are not copied as they are."""
 
 
 @click.command()
@@ -102,21 +77,20 @@ def _drafted(directory: Path, bag: Path | None, graph: str | None, distro: str |
 
 def _from_template(directory: Path, template: str) -> None:
     for part in ("template", *(("template_ros",) if template != "plain" else ())):
-        origin = Path(str(resources.files("avow.cli") / part))
+        origin = _TEMPLATES / part
         for source in sorted(origin.rglob("*")):
-            if source.is_file() and "__pycache__" not in source.parts:
-                name = source.relative_to(origin)
-                write(directory / (".gitignore" if name.name == "gitignore.txt" else name), source.read_bytes())
+            if source.is_file() and source.name not in _PARTS and "__pycache__" not in source.parts:
+                write(directory / source.relative_to(origin), source.read_bytes())
     if template != "plain":
         plan = directory / "contracts/thermostat/plan.yaml"
-        write(plan, plan.read_text("utf-8").replace("\n\npolicy:", f"\n{_MONITOR.format(template)}\npolicy:"))
+        monitor = (_TEMPLATES / "template_ros/monitor.txt").read_text("utf-8").replace("ROS", template)
+        write(plan, plan.read_text("utf-8").replace("\n\npolicy:", f"\n{monitor}\npolicy:"))
 
 
 def _workspace(directory: Path) -> None:
     """The files of every workspace."""
-    ignored = Path(str(resources.files("avow.cli") / "template/gitignore.txt"))
-    write(directory / ".gitignore", ignored.read_bytes())
-    write(directory / "dodo.py", _DODO)
+    for name, source in ((".gitignore", "gitignore.txt"), ("dodo.py", "dodo.txt")):
+        write(directory / name, (_TEMPLATES / "template" / source).read_bytes())
     for folder in ("artifacts", "reports"):
         write(directory / folder / "README.md", f"Made by `doit verify`: see Avow's documentation of {folder}/.\n")
 

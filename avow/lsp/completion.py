@@ -27,8 +27,7 @@ class Offer:
 
     label: str
     kind: str
-    """keyword, operator, function, type, element, field, constant, definition, input, output, variable, node,
-    guarantee, unit, key"""
+    """The protocol's name of it: a `CompletionItemKind`."""
     detail: str = ""
     template: str = ""
     about: str = ""
@@ -176,8 +175,8 @@ def _offers(place: _Place, contract: Contract) -> Iterator[Offer]:
     node = next((n for n in contract.nodes if n.name == place.node), None)
     match place.top, place.section:
         case "", _:
-            yield Offer("node", "keyword", "a node's contract", NODE)
-            yield Offer("context", "keyword", "types and constants", CONTEXT)
+            yield Offer("node", "Keyword", "a node's contract", NODE)
+            yield Offer("context", "Keyword", "types and constants", CONTEXT)
         case "CONTEXT", _:
             if place.defines and any(t.type == "EQUALS" for t in place.before):
                 yield from _of_formula(place, node, contract)
@@ -187,16 +186,16 @@ def _offers(place: _Place, contract: Contract) -> Iterator[Offer]:
                 yield from _values(contract)
         case "NODE", "":
             for word, (template, detail) in SECTIONS.items():
-                yield Offer(word, "keyword", detail, template)
+                yield Offer(word, "Keyword", detail, template)
         case "NODE", "INPUTS" | "OUTPUTS":
             if any(t.type == "COLON" for t in place.before):
                 yield from _types(contract)
         case "NODE", "STEPS":
             if place.last == "NUMBER":
-                yield from (Offer(unit, "unit") for unit in (*UNITS, *LONG_UNITS))
+                yield from (Offer(unit, "Unit") for unit in (*UNITS, *LONG_UNITS))
             elif place.last == "LPAR":
-                yield Offer("every", "keyword", "exactly so far apart")
-                yield Offer("at most", "keyword", "no further apart")
+                yield Offer("every", "Keyword", "exactly so far apart")
+                yield Offer("at most", "Keyword", "no further apart")
         case "NODE", "TOPICS":
             yield from _of_topic(place, node)
         case "NODE", "DEFINE":
@@ -218,9 +217,9 @@ def _of_topic(place: _Place, node: Node | None) -> Iterator[Offer]:
         yield from _ports(node, Role.INPUT, "in.")
         yield from _ports(node, Role.OUTPUT, "out.")
     elif words[-1:] in (["LPAR"], ["COMMA"]):
-        yield from (Offer(name, "type", "a built-in type of ROS") for name in ROS_BUILTINS)
+        yield from (Offer(name, "Struct", "a built-in type of ROS") for name in ROS_BUILTINS)
     elif words[-1:] == ["NAME"]:
-        yield Offer("matches", "keyword", "the input or output that it carries", "matches(${1:in.name})")
+        yield Offer("matches", "Keyword", "the input or output that it carries", "matches(${1:in.name})")
 
 
 def _of_formula(place: _Place, node: Node | None, contract: Contract) -> Iterator[Offer]:
@@ -232,7 +231,7 @@ def _of_formula(place: _Place, node: Node | None, contract: Contract) -> Iterato
         yield from _fields(place, node, contract)
         return
     if words[-1:] == ["NUMBER"] and "LSQUARE" in words and "RSQUARE" not in words[words.index("LSQUARE") :]:
-        yield from (Offer(unit, "unit") for unit in (*STEPS, *UNITS, *LONG_UNITS))
+        yield from (Offer(unit, "Unit") for unit in (*STEPS, *UNITS, *LONG_UNITS))
         return
     if words[-1:] in (["IN"], ["NOT_IN"]):
         yield from _types(contract)
@@ -240,21 +239,21 @@ def _of_formula(place: _Place, node: Node | None, contract: Contract) -> Iterato
         yield from _of_sort(sort, node, contract)
         if isinstance(sort, EnumSort | DataSort | BoolSort):
             return
-    yield from (Offer(name, "variable", "quantified") for name in place.bound)
-    yield from (Offer(name, "variable", "a parameter") for name in place.parameters)
+    yield from (Offer(name, "Variable", "quantified") for name in place.bound)
+    yield from (Offer(name, "Variable", "a parameter") for name in place.parameters)
     for role in (Role.INPUT, Role.OUTPUT):
         yield from _ports(node, role, f"{role}.")
     yield from _values(contract)
     for definition in _definitions(node, contract):
         stops = ", ".join(f"${{{k}:{p.name}}}" for k, p in enumerate(definition.parameters, 1))
-        yield Offer(definition.name, "definition", definition.text, f"{definition.name}({stops})" if stops else "")
+        yield Offer(definition.name, "Function", definition.text, f"{definition.name}({stops})" if stops else "")
     for form in (form for form in FORMS.values() if form.name != Past.STEPS):
-        yield Offer(form.name, "function", form.label, form.template, form.meaning)
+        yield Offer(form.name, "Function", form.label, form.template, form.meaning)
     for word, meaning in QUANTIFIERS.items():
-        yield Offer(word, "operator", f"{word}(x in S | F)", f"{word}(${{1:x}} in ${{2:REAL}} | ${{3:F}})", meaning)
-    yield Offer("if", "operator", "if F then s else t", "if ${1:F} then ${2:s} else ${3:t}")
-    yield from (Offer(word, "operator", detail) for word, detail in CONNECTIVES.items())
-    yield from (Offer(word, "constant", "BOOL") for word in ("TRUE", "FALSE"))
+        yield Offer(word, "Operator", f"{word}(x in S | F)", f"{word}(${{1:x}} in ${{2:REAL}} | ${{3:F}})", meaning)
+    yield Offer("if", "Operator", "if F then s else t", "if ${1:F} then ${2:s} else ${3:t}")
+    yield from (Offer(word, "Operator", detail) for word, detail in CONNECTIVES.items())
+    yield from (Offer(word, "Constant", "BOOL") for word in ("TRUE", "FALSE"))
 
 
 def _definitions(node: Node | None, contract: Contract) -> tuple[Definition, ...]:
@@ -268,7 +267,7 @@ def _fields(place: _Place, node: Node | None, contract: Contract) -> Iterator[Of
     whole = found or [*components(*(sort for _, sort in contract.types), *(p.sort for p in ports))]
     for sort in _records(whole):
         pairs = zip(sort.labels, sort.items, strict=False)
-        yield from (Offer(label, "field", show_sort(item)) for label, item in pairs)
+        yield from (Offer(label, "Field", show_sort(item)) for label, item in pairs)
 
 
 def _sorts_of(before: Sequence[Token], ports: Sequence[Port]) -> list[Sort]:
@@ -294,10 +293,10 @@ def _sort_before(place: _Place, node: Node | None) -> Sort | None:
 def _of_sort(sort: Sort, node: Node | None, contract: Contract) -> Iterator[Offer]:
     """The values of this sort: elements, the truth values, constants and ports."""
     elements = of_contract(contract).elements
-    yield from (o for o in _values(contract) if o.kind == "element" and elements[o.label] == sort)
-    yield from (Offer(name, "constant", show_term(t, "rcl")) for name, t in contract.constants if t.sort == sort)
+    yield from (o for o in _values(contract) if o.kind == "EnumMember" and elements[o.label] == sort)
+    yield from (Offer(name, "Constant", show_term(t, "rcl")) for name, t in contract.constants if t.sort == sort)
     if isinstance(sort, BoolSort):
-        yield from (Offer(word, "constant", "BOOL") for word in ("TRUE", "FALSE"))
+        yield from (Offer(word, "Constant", "BOOL") for word in ("TRUE", "FALSE"))
     alike = (
         {f"{p.role}.{p.name}" for p in (*node.inputs, *node.outputs) if p.sort == sort} if node is not None else set()
     )
@@ -312,20 +311,20 @@ def _records(sorts: Iterable[Sort]) -> list[TupleSort]:
 def _ports(node: Node | None, role: Role, before: str) -> Iterator[Offer]:
     for port in (node.inputs if role is Role.INPUT else node.outputs) if node is not None else ():
         detail = f"{port.type_name} = {shown}" if (shown := show_type(port.sort)) != port.type_name else shown
-        yield Offer(before + port.name, "input" if role is Role.INPUT else "output", detail)
+        yield Offer(before + port.name, "Field", detail)
 
 
 def _types(contract: Contract) -> Iterator[Offer]:
-    yield from (Offer(name, "type", show_type(sort)) for name, sort in contract.types)
-    yield from (Offer(name, "type", detail) for name, detail in BUILTIN_TYPES.items())
+    yield from (Offer(name, "Struct", show_type(sort)) for name, sort in contract.types)
+    yield from (Offer(name, "Struct", detail) for name, detail in BUILTIN_TYPES.items())
 
 
 def _values(contract: Contract) -> Iterator[Offer]:
     for name, sort in of_contract(contract).elements.items():
         parameters = sort.constructor(name).parameters if isinstance(sort, DataSort) else ()
         stops = ", ".join(f"${{{k}:{show_sort(p)}}}" for k, p in enumerate(parameters, 1))
-        yield Offer(name, "element", f"an element of {sort.name}", f"{name}({stops})" if parameters else "")
-    yield from (Offer(name, "constant", show_term(term, "rcl")) for name, term in contract.constants)
+        yield Offer(name, "EnumMember", f"an element of {sort.name}", f"{name}({stops})" if parameters else "")
+    yield from (Offer(name, "Constant", show_term(term, "rcl")) for name, term in contract.constants)
 
 
 # --- signatures ------------------------------------------------------------------------------------------------------

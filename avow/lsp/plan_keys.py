@@ -31,13 +31,13 @@ def plan_offers(text: str, contract: Contract, offset: int) -> tuple[Offer, ...]
     owner = re.search(r"([A-Za-z_][A-Za-z0-9_']*)\.(?:(in|out)\.)?[A-Za-z0-9_']*$", line)
     if owner is not None:
         return tuple(_of_node(contract, owner[1], owner[2]))
-    nodes = [Offer(node.name, "node", "node") for node in contract.nodes]
+    nodes = [Offer(node.name, "Class", "node") for node in contract.nodes]
     if not _TYPING.match(line):
         return tuple(nodes)
     path = _path(text[:begin].split("\n"), len(line) - len(line.lstrip(" -")))
-    keys = [Offer(key, "key", detail, f"{key}: ") for key, detail in _keys(path)]
+    keys = [Offer(key, "Property", detail, f"{key}: ") for key, detail in _keys(path)]
     if path and path[-1] in _NAMED:
-        keys += [Offer(node.name, "node", "node", f"{node.name}:") for node in contract.nodes]
+        keys += [Offer(node.name, "Class", "node", f"{node.name}:") for node in contract.nodes]
     return tuple(keys or nodes)
 
 
@@ -51,9 +51,9 @@ def _of_node(contract: Contract, owner: str, role: str | None) -> Iterator[Offer
             side = role or (owner if owner in ("in", "out") else None)
             for port in (*node.inputs, *node.outputs):
                 if side is None or port.role == side:
-                    yield Offer(port.name, "input" if port in node.inputs else "output", port.type_name)
+                    yield Offer(port.name, "Field", port.type_name)
         if node.name == owner and role is None:
-            yield from (Offer(c.name, "guarantee", c.sentence or "") for c in node.guarantees)
+            yield from (Offer(c.name, "Method", c.sentence or "") for c in node.guarantees)
 
 
 def _path(lines: Sequence[str], indent: int) -> tuple[str, ...]:

@@ -29,23 +29,6 @@ _DECLARED = {
     Define: ("definition", types.SymbolKind.Function),
 }
 _CLAUSES = {ClauseKind.ASSUMPTION: types.SymbolKind.Event, ClauseKind.GUARANTEE: types.SymbolKind.Function}
-_OFFERS = {
-    "keyword": types.CompletionItemKind.Keyword,
-    "operator": types.CompletionItemKind.Operator,
-    "function": types.CompletionItemKind.Function,
-    "type": types.CompletionItemKind.Struct,
-    "element": types.CompletionItemKind.EnumMember,
-    "constant": types.CompletionItemKind.Constant,
-    "definition": types.CompletionItemKind.Function,
-    "field": types.CompletionItemKind.Field,
-    "input": types.CompletionItemKind.Field,
-    "output": types.CompletionItemKind.Field,
-    "variable": types.CompletionItemKind.Variable,
-    "node": types.CompletionItemKind.Class,
-    "guarantee": types.CompletionItemKind.Method,
-    "unit": types.CompletionItemKind.Unit,
-    "key": types.CompletionItemKind.Property,
-}
 
 
 class Lines:
@@ -151,7 +134,7 @@ def completion_item(offer: Offer, number: int, snippets: bool) -> types.Completi
     template = offer.template if snippets and offer.template else ""
     return types.CompletionItem(
         label=offer.label,
-        kind=_OFFERS[offer.kind],
+        kind=types.CompletionItemKind[offer.kind],
         detail=offer.detail or None,
         documentation=offer.about or None,
         insert_text=template or offer.label,

@@ -49,9 +49,9 @@ def test_it_completes_them() -> None:
         return {o.label: o.kind for o in offers(document.taken_apart, document.project.contract, at)}
 
     in_clause = offered('far" ( ')
-    assert (in_clause["beyond"], in_clause["far"]) == ("definition", "definition")
+    assert (in_clause["beyond"], in_clause["far"]) == ("Function", "Function")
     in_body = offered("define beyond(a, b : REAL) = ")
-    assert (in_body["far"], in_body["a"], in_body["in.x"]) == ("definition", "variable", "input")
+    assert (in_body["far"], in_body["a"], in_body["in.x"]) == ("Function", "Variable", "Field")
     assert "far" not in offered("topics()\n  ")
     assert "define" in offered("topics()\n  ")
     told = signature(document.taken_apart, document.project.contract, TEXT.index("beyond(1, 2)") + len("beyond(1, "))
