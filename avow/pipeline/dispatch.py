@@ -27,7 +27,7 @@ from avow.evidence.record import RETRY
 from avow.isolation.observed import Observed, Seen
 from avow.pipeline.blobs import encode
 from avow.pipeline.methods import tool_identities
-from avow.pipeline.requests import Altered, Request, Response
+from avow.pipeline.requests import Request, Response
 from avow.pipeline.run_info import Run
 from avow.pipeline.work import COMPOSE, Work, engine_identity
 
@@ -40,7 +40,6 @@ def settle(
     obligations: tuple[Obligation, ...],
     folder: Path,
     run: Run,
-    altered: Altered | None = None,
     kept: Mapping[str, tuple[Any, ...]] | None = None,
 ) -> Report:
     """Discharge the obligations in a process of their own, here or remotely; `kept` are cases that refuted them
@@ -49,7 +48,7 @@ def settle(
         return _failed(obligations, work, Verdict.NOT_RUN, f"no worker of the cluster offers {', '.join(lacking)}", {})
     try:
         request = replace(
-            request_of(workspace, work, obligations, folder, altered),
+            request_of(workspace, work, obligations, folder),
             kept=kept or {},
             earlier=_earlier(workspace, work, run),
         )
@@ -97,9 +96,7 @@ def _lacking(work: Work, run: Run) -> tuple[str, ...]:
     return () if any(name in run.offered for name in wanted) else tuple(wanted)
 
 
-def request_of(
-    workspace: Workspace, work: Work, obligations: Sequence[Obligation], folder: Path, altered: Altered | None = None
-) -> Request:
+def request_of(workspace: Workspace, work: Work, obligations: Sequence[Obligation], folder: Path) -> Request:
     """Raises OSError for a file of the plan that cannot be read."""
     assert work.cut is not None
     root = work.system.plan.root.absolute()
@@ -117,7 +114,6 @@ def request_of(
         work.tools,
         "" if work.is_portable else str(root),
         workspace.relative(folder),
-        altered,
     )
 
 

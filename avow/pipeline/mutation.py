@@ -11,6 +11,7 @@ and have no score. Each survivor is reported with an input and answer at which i
 
 from __future__ import annotations
 
+import contextlib
 import shutil
 import tempfile
 from collections.abc import Iterator
@@ -19,16 +20,18 @@ from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
 
+from avow.base.diagnostics import Rejected
+from avow.base.files import write
 from avow.base.verdict import Link, Outcome, Verdict
 from avow.base.workspace import Workspace
 from avow.evidence.ledger import ledger_of
 from avow.evidence.obligation import Kind, Obligation
 from avow.evidence.record import RETRY, Evidence
 from avow.pipeline import dispatch
-from avow.pipeline.requests import Altered, chosen
+from avow.pipeline.export import generated
 from avow.pipeline.run_info import Run
-from avow.pipeline.work import Work
-from avow.sanity.mutants import Difference, Mutant, difference
+from avow.pipeline.work import Work, method_work
+from avow.sanity.mutants import Difference, Mutant, difference, telling
 
 _Task = tuple[Work, Obligation, Evidence]
 
@@ -99,14 +102,18 @@ def _tasks(workspace: Workspace, work: Work) -> list[_Task]:
 def _score(workspace: Workspace, task: _Task, run: Run, limit: int) -> Score:
     work, obligation, record = task
     node = work.system.contract.node(work.node)
-    mutants = chosen(node, node.clause(obligation.name), limit)
+    clause = node.clause(obligation.name)
+    others = tuple(g.formula for g in node.guarantees if g.name != clause.name)
+    mutants = telling(clause.formula, tuple(a.formula for a in node.assumptions), limit, others=others)
     killed, survivors, unjudged = 0, list[Mutant](), list[tuple[str, str]]()
-    for number, mutant in enumerate(mutants):
+    for mutant in mutants:
+        changed = _with_mutant(work, clause.name, mutant)
         folder = Path(tempfile.mkdtemp(prefix="avow-mutant-"))
         try:
-            report = dispatch.settle(
-                workspace, work, (obligation,), folder, run, Altered(obligation.name, number, limit)
-            )
+            with contextlib.suppress(Rejected):  # without its files the method reports the fault
+                for name, text in generated(changed).items():
+                    write(folder / name, text)
+            report = dispatch.settle(workspace, changed, (obligation,), folder, run)
         finally:
             shutil.rmtree(folder, ignore_errors=True)
         match _noticed(report.outcomes[0], record):
@@ -128,6 +135,17 @@ def _score(workspace: Workspace, task: _Task, run: Run, limit: int) -> Score:
     )
     ledger_of(workspace.ledger(work.system.name)).append(_scored(record, score, run))
     return score
+
+
+def _with_mutant(work: Work, name: str, mutant: Mutant) -> Work:
+    """The job for the system with the mutant in place of a guarantee."""
+    assert work.planned is not None
+    job, contract = work.planned[1], work.system.contract
+    guarantees = tuple(replace(c, formula=mutant.formula) if c.name == name else c for c in job.node.guarantees)
+    node = replace(job.node, guarantees=guarantees)
+    nodes = tuple(node if n.name == node.name else n for n in contract.nodes)
+    system = replace(work.system, contract=replace(contract, nodes=nodes))
+    return replace(method_work(system, node, job.method), limits=work.limits, texts=work.texts)
 
 
 def _noticed(outcome: Outcome, record: Evidence) -> bool | None:

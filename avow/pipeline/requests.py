@@ -4,28 +4,16 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping
-from dataclasses import field, replace
+from dataclasses import field
 from pathlib import Path
 from typing import Any
 
 from avow.backend_kit.protocol import Limits, Report
 from avow.base.codec import Unreadable, canonical, from_text, to_json
 from avow.base.records import dataclass
-from avow.language.contract import Clause, Node
-from avow.sanity.mutants import Mutant, telling
-from avow.system.plan import System
 
 Tools = tuple[tuple[str, ...], ...]
 """Name, version, … of each outside tool, as the keys have them; no version where it is missing."""
-
-
-@dataclass(frozen=True, slots=True)
-class Altered:
-    """Which mutant replaces which guarantee (see `avow.pipeline.mutation`)."""
-
-    clause: str
-    number: int
-    limit: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +38,6 @@ class Request:
     """The system's folder, for a method that reads more than those files: its job runs where that folder is."""
     folder: str = ""
     """Where the exported files are; relative to the workspace."""
-    altered: Altered | None = None
     kept: Mapping[str, tuple[Any, ...]] = field(default_factory=dict)
     """Obligation → earlier refuting cases, as its backend wrote them (`record.CASE`): they are tried first."""
     earlier: str = ""
@@ -119,19 +106,3 @@ def lay_out(files: Mapping[str, bytes], root: Path) -> None:
             raise ValueError(f"{name} leaves the folder")
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_bytes(data)
-
-
-def alter(system: System, node: Node, altered: Altered) -> System:
-    """The system with a mutant in place of a guarantee. Raises KeyError or IndexError where there is none."""
-    clause = node.clause(altered.clause)
-    mutant = chosen(node, clause, altered.limit)[altered.number]
-    guarantees = tuple(replace(c, formula=mutant.formula) if c.name == clause.name else c for c in node.guarantees)
-    changed = replace(node, guarantees=guarantees)
-    nodes = tuple(changed if n.name == node.name else n for n in system.contract.nodes)
-    return replace(system, contract=replace(system.contract, nodes=nodes))
-
-
-def chosen(node: Node, clause: Clause, limit: int) -> tuple[Mutant, ...]:
-    """The mutants that are tried: the same ones, in the same order, in every process."""
-    others = tuple(g.formula for g in node.guarantees if g.name != clause.name)
-    return telling(clause.formula, tuple(a.formula for a in node.assumptions), limit, others=others)

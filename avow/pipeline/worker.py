@@ -22,7 +22,6 @@ from avow.backend_kit.registry import trust_plugins
 from avow.base import process
 from avow.base.codec import from_json, to_json
 from avow.base.diagnostics import Diagnostic, Rejected, Severity, Span
-from avow.base.files import write
 from avow.base.verdict import Outcome, Verdict
 from avow.calculus import providers
 from avow.calculus.composition import compose
@@ -34,12 +33,11 @@ from avow.evidence.record import REMARKS, RETRY
 from avow.pipeline import recheck
 from avow.pipeline.blobs import Garbled, decode
 from avow.pipeline.dispatch import ANSWERS, CHANGED, read_answers, write_answers
-from avow.pipeline.methods import method_job, tool_identities
+from avow.pipeline.methods import tool_identities
 from avow.pipeline.requests import (
     Request,
     Response,
     Tools,
-    alter,
     lay_out,
     read_request,
     request_digest,
@@ -164,12 +162,6 @@ def _discharge(request: Request, system: System, work: Work) -> Report:
     if here != request.tools:
         raise Refused(f"the tools are not those of the key: {_shown(here)} here, {_shown(request.tools)} wanted")
     claims = _claims(request, work.obligations, work.keys)
-    folder = Path(request.folder)
-    if request.altered:
-        system = alter(system, job.node, request.altered)
-        job = method_job(system, system.contract.node(work.node), job.method)
-        for name, text in one_step.export(tool, job).items():
-            write(folder / name, text)
     wanted = {o.id for o in claims}
     job = replace(
         job,
@@ -177,11 +169,11 @@ def _discharge(request: Request, system: System, work: Work) -> Report:
         claims=tuple(o for o in job.claims if o.id in wanted),
         kept=request.kept,
     )
-    report = one_step.discharge(tool, job, folder, request.limits)
-    if request.root and not request.altered:  # tools read the plan's files themselves, at any time until now
+    report = one_step.discharge(tool, job, Path(request.folder), request.limits)
+    if request.root:  # tools read the plan's files themselves, at any time until now
         again = _method_work(system, work.node, work.method)
         _claims(request, again.obligations, again.keys)
-    return report if request.altered else remarked(report, one_step.check(tool, job), job)
+    return remarked(report, one_step.check(tool, job), job)
 
 
 def discharge_sanity(cut: SanitySlice, obligations: Sequence[Obligation], limits: Limits) -> Report:
