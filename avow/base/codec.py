@@ -2,10 +2,10 @@
 follows.
 
 Writing, reading and the schema come from the same type hints, so they cannot drift apart. Reading is strict: an unknown
-or missing field, a value of another type, a repeated key, or a malformed number is `Unreadable`, never guessed; all
-faults are reported at once. Values in a field of type Any become plain when written (fractions, paths, enumerations
-become texts). A NamedTuple is a row, a list without names, for data in thousands; bytes are text in base64. For a
-union, the first member that fits the data is read.
+or missing field, a value of another type, a repeated key, or a malformed number is `Unreadable`, never guessed. Values
+in a field of type Any become plain when written (fractions, paths, enumerations become texts). A NamedTuple is a row, a
+list without names, for data in thousands; bytes are text in base64. For a union, the first member that fits the data is
+read.
 
 Other modules make plain dictionaries only if a standard defines them (SARIF, in-toto, DSSE, JUnit, CycloneDX, ReqIF,
 ROS), if a command shows data without a dataclass, and in `avow.pipeline.blobs`, whose values share their parts.
@@ -16,18 +16,17 @@ from __future__ import annotations
 
 import base64
 import dataclasses
+import itertools
 import json
 import math
 import re
 import sys
 import types
 import typing
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from enum import StrEnum
 from functools import cache
 from typing import Any, NamedTuple, TypeVar
-
-from avow.base.tuning.shown import FAULTS
 
 T = TypeVar("T")
 Read = Callable[[Any], Any]
@@ -49,16 +48,7 @@ class Foreign:
 
 
 class Unreadable(ValueError):  # noqa: N818 - it says what the text is
-    """Text in a wrong format: torn, edited, or of another program. `faults`: each with its place."""
-
-    def __init__(self, *faults: str) -> None:
-        self.faults = faults
-        more = [f"{len(faults) - FAULTS} more"] if len(faults) > FAULTS else []
-        super().__init__("; ".join([*faults[:FAULTS], *more]))
-
-    def within(self, place: str) -> list[str]:
-        """The faults, for text that is part of a larger one at that place."""
-        return [place + fault for fault in self.faults]
+    """Text in a wrong format: torn, edited, or of another program. The message begins with the place."""
 
 
 def canonical(value: object) -> str:
@@ -133,7 +123,7 @@ def from_json(kind: type[T], data: object) -> T:
         found: T = _reader(typing.cast(Any, kind))(data)
     except Unreadable as error:
         name = kind.__name__.strip("_").lower() if dataclasses.is_dataclass(kind) else "it"
-        raise Unreadable(*error.within(name)) from None
+        raise Unreadable(f"{name}{error}") from None
     return found
 
 
@@ -213,52 +203,33 @@ def _reader(kind: Any) -> Read:
 
 def _of_fields(kind: type) -> Read:
     fields, foreign, told = _fields(kind), issubclass(kind, Foreign), dataclasses.fields(kind)
-    names, needed = list(fields), fields.keys() - _later(kind)
-    in_order = [
-        (key, _reader(field.hint), _MISSING if key in needed else one.default)
-        for (key, field), one in zip(fields.items(), told, strict=True)
-    ]
-    by_place = all(f.init and not f.kw_only for f in told)
+    needed, by_place = fields.keys() - _later(kind), all(f.init and not f.kw_only for f in told)
+    readers = [(key, field.name, _reader(field.hint)) for key, field in fields.items()]
 
     def whole(data: Any) -> Any:
         if type(data) is not dict:
             raise Unreadable(f": not a {kind.__name__}")
-        values: list[Any] = []
-        there, made, faults = 0, by_place, tuple[str, ...]()
-        for key, read, default in in_order:
-            if key in data:
-                there += 1
-                try:
-                    values.append(read(data[key]))
-                except Unreadable as error:
-                    faults = (*faults, *error.within(f".{key}"))
-            else:
-                values.append(default)
-                made = made and default is not _MISSING
-        if there != len(data) or (there != len(names) and not needed <= data.keys()):
-            missing, extra = needed - data.keys(), () if foreign else data.keys() - fields.keys()
-            if missing or extra:
-                faults = (f": fields missing: {sorted(missing)}, unknown: {sorted(map(str, extra))}", *faults)
-        if faults:
-            raise Unreadable(*faults)
-        if made:
-            return kind(*values)
-        return kind(**{fields[key].name: value for key, value in zip(names, values, strict=True) if key in data})
+        missing, extra = needed - data.keys(), () if foreign else data.keys() - fields.keys()
+        if missing or extra:
+            raise Unreadable(f": fields missing: {sorted(missing)}, unknown: {sorted(map(str, extra))}")
+        at = ""
+        try:
+            if by_place and len(data) == len(readers) and not foreign:  # quicker than by name
+                return kind(*[read(data[at := key]) for key, _, read in readers])
+            return kind(**{name: read(data[at := key]) for key, name, read in readers if key in data})
+        except Unreadable as error:
+            raise Unreadable(f".{at}{error}") from None
 
     return whole
 
 
-def _every(reads: Iterable[tuple[str, Read, Any]]) -> list[Any]:
-    """The values read at each place. Raises Unreadable, with all faults."""
-    found, faults = list[Any](), list[str]()
-    for place, read, item in reads:
+def _every(readers: Iterable[Read], items: Iterable[Any]) -> Iterator[Any]:
+    """What each reader makes of its item. Raises Unreadable, with the item's index."""
+    for at, (read, item) in enumerate(zip(readers, items, strict=False)):
         try:
-            found.append(read(item))
+            yield read(item)
         except Unreadable as error:
-            faults += error.within(place)
-    if faults:
-        raise Unreadable(*faults)
-    return found
+            raise Unreadable(f"[{at}]{error}") from None
 
 
 def _row(kind: Any) -> tuple[Any, ...]:
@@ -288,25 +259,13 @@ def _of_union(readers: list[Read], *, optional: bool) -> Read:
 def _of_tuple(arguments: tuple[Any, ...]) -> Read:
     if len(arguments) == 2 and arguments[1] is Ellipsis:
         one = _reader(arguments[0])
-
-        def several(data: Any) -> tuple[Any, ...]:
-            items = _list(data)
-            try:
-                return tuple(map(one, items))
-            except Unreadable:
-                return tuple(_every((f"[{at}]", one, item) for at, item in enumerate(items)))
-
-        return several
+        return lambda data: tuple(_every(itertools.repeat(one), _list(data)))
     readers = tuple(map(_reader, arguments))
 
     def fixed(data: Any) -> tuple[Any, ...]:
         if len(_list(data)) != len(readers):
             raise Unreadable(f": {len(readers)} items are wanted")
-        try:
-            return tuple([read(item) for read, item in zip(readers, data, strict=True)])
-        except Unreadable:
-            reads = enumerate(zip(readers, data, strict=True))
-            return tuple(_every((f"[{at}]", read, item) for at, (read, item) in reads))
+        return tuple(_every(readers, data))
 
     return fixed
 
@@ -321,10 +280,11 @@ def _of_mapping(read: Read) -> Read:
     def mapping(data: Any) -> dict[str, Any]:
         if type(data) is not dict:
             raise Unreadable(": not an object")
+        at = ""
         try:
-            return {key: read(item) for key, item in data.items()}
-        except Unreadable:
-            return dict(zip(data, _every((f".{key}", read, item) for key, item in data.items()), strict=True))
+            return {key: read(data[at := key]) for key in data}
+        except Unreadable as error:
+            raise Unreadable(f".{at}{error}") from None
 
     return mapping
 

@@ -92,7 +92,7 @@ def read(path: Path) -> Project:
         told = codec.parsed(text)
         found = codec.from_json(_Export, told if isinstance(told, dict) else {"requirements": told})
     except codec.Unreadable as error:
-        raise Rejected(*(Diagnostic("FRET001", f"{path} is no export of FRET's: {w}") for w in error.faults)) from None
+        raise Rejected(Diagnostic("FRET001", f"{path} is no export of FRET's: {error}")) from None
     requirements = (
         Requirement(r.reqid or f"R{k}", r.fulltext, _place(text, r.fulltext, str(path)), r.project or "")
         for k, r in enumerate(found.requirements, start=1)

@@ -155,24 +155,24 @@ def test_what_is_no_file_of_requirements_is_code_2(tmp_path: Path, content: byte
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        ({"requirements": [{"reqid": "A"}, {"fulltext": 3}]}, ["requirements[0]: fields missing", "[1].fulltext: not"]),
-        ({"requirements": {}, "variables": 7}, ["requirements: not a list", "variables: not a list"]),
-        ({"requirements": [], "variables": [{"variable_name": []}, None]}, ["['component_name']", "[0].vari", "[1]"]),
-        ('{"requirements": [], "requirements": []}', ["stands twice"]),
-        ('[{"fulltext": NaN}]', ["NaN"]),
-        (f'[{{"fulltext": {"9" * 5000}}}]', ["limit"]),
-        ("[" * 100_000, ["too deeply"]),
+        ({"requirements": [{"reqid": "A"}, {"fulltext": 3}]}, "requirements[0]: fields missing"),
+        ({"requirements": [{"fulltext": "a"}, {"fulltext": 3}]}, "[1].fulltext: not"),
+        ({"requirements": {}}, "requirements: not a list"),
+        ({"requirements": [], "variables": [{"variable_name": []}]}, "['component_name']"),
+        ('{"requirements": [], "requirements": []}', "stands twice"),
+        ('[{"fulltext": NaN}]', "NaN"),
+        (f'[{{"fulltext": {"9" * 5000}}}]', "limit"),
+        ("[" * 100_000, "too deeply"),
     ],
 )
-def test_all_that_is_wrong_with_an_export_is_told_at_once(tmp_path: Path, change: object, said: list[str]) -> None:
+def test_what_is_wrong_with_an_export_is_told(tmp_path: Path, change: object, said: str) -> None:
     path = tmp_path / "x.json"
     path.write_text(change if isinstance(change, str) else json.dumps(change))
     with pytest.raises(Rejected) as told:
         read(path)
-    assert {d.code for d in told.value.diagnostics} == {"FRET001"}
-    assert len(told.value.diagnostics) == len(said)
-    for diagnostic, part in zip(told.value.diagnostics, said, strict=True):
-        assert part in diagnostic.message
+    (found,) = told.value.diagnostics
+    assert found.code == "FRET001"
+    assert said in found.message
 
 
 def test_half_a_character_of_an_export_is_shown_as_unreadable(tmp_path: Path) -> None:

@@ -38,9 +38,6 @@ DIAGNOSTICS = 200
 ALIKE = 5
 """Diagnostics of one file that differ in their place alone: one mistake, made again and again, hides no other."""
 
-FAULTS = 20
-"""Faults of one JSON text that a message lists: whoever mends so many tries again."""
-
 WARNINGS = 3
 """Warnings of a system that a run prints, a line each: `avow check` shows all."""
 
