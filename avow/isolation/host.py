@@ -69,16 +69,18 @@ class Table:
 
 
 def plain(data: Any) -> Any:
-    """Converts a value from the judge's form to the program's."""
+    """Converts a value from the judge's form to the program's: the form of `avow.drive.steps`, and tables."""
     match data:
         case {"q": [numerator, denominator]}:
             return Fraction(int(numerator), int(denominator))
-        case {"r": text}:
-            return float.fromhex(text)
+        case {"i": digits}:
+            return int(digits)
         case {"t": items}:
             return tuple(plain(item) for item in items)
-        case {"f": rows, "d": default}:
+        case {"f": rows, "e": default}:
             return Table({tuple(plain(a) for a in point): plain(value) for point, value in rows}, plain(default))
+        case {"f": text}:
+            return float.fromhex(text)
         case _:  # a value that is its own JSON
             return data
 
@@ -96,29 +98,25 @@ def coded(value: Any, depth: int = 0) -> Any:
         case str():
             return str(value)
         case int():
-            return {"q": [str(int(value)), "1"], "w": True}
-        case Fraction():
-            return _ratio(value.numerator, value.denominator)
-        case float() | Decimal():
+            return {"i": str(int(value))}
+        case float():
+            return {"f": float(value).hex()}
+        case Fraction() | Decimal():
             try:
-                return _ratio(*value.as_integer_ratio())
+                return {"q": [str(part) for part in value.as_integer_ratio()]}
             except (ValueError, OverflowError):
                 return {"?": f"the number {value}"}
         case Table():
             rows = [[[coded(a, inner) for a in k], coded(v, inner)] for k, v in value._table.items()]
-            return {"f": rows, "d": coded(value.default, inner)}
+            return {"f": rows, "e": coded(value.default, inner)}
         case Mapping():
             rows = [[coded(k, inner) if k is not ... else {"...": True}, coded(v, inner)] for k, v in value.items()]
-            return {"m": rows}
+            return {"d": rows}
         case set() | frozenset():
             return {"s": [coded(item, inner) for item in value]}
         case tuple() | list():
-            return {"t": [coded(item, inner) for item in value]}
+            return {"l": [coded(item, inner) for item in value]}
     return {"?": f"a value of type {type(value).__name__}"}
-
-
-def _ratio(numerator: int, denominator: int) -> dict[str, Any]:
-    return {"q": [str(numerator), str(denominator)]}
 
 
 def load(path: str, name: str, function: str, drive: Any = None) -> Any:

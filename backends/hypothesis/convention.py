@@ -27,41 +27,43 @@ class Malformed(Exception):  # noqa: N818 - it names what is wrong
     """The program returned something that is not a value of the output's type."""
 
 
-def sent(value: Value) -> Any:
-    """A value as JSON data for the host."""
+def sent(value: Value, *, doubles: bool, lists: bool = False) -> Any:
+    """A value as JSON data for the program. `doubles`: its numbers are floats; `lists`: its sequences are lists."""
+
+    def part(inner: Value) -> Any:
+        return sent(inner, doubles=doubles, lists=lists)
+
     match value:
         case bool() | str():
             return value
         case int():
-            return value
+            return {"i": str(value)}
         case Fraction():
-            return {"q": [value.numerator, value.denominator]}
+            return {"f": float(value).hex()} if doubles else {"q": [str(value.numerator), str(value.denominator)]}
         case Element(name=name):
             return name
         case Opaque():
             return str(value)
         case Data(constructor=constructor, arguments=arguments):
-            return {"t": [constructor, *map(sent, arguments)]}
+            return {"t": [constructor, *map(part, arguments)]}
         case SequenceValue(items=items):
-            return {"t": [sent(item) for item in items]}
+            return {"l" if lists else "t": [*map(part, items)]}
         case FunctionValue(table=table, default=default):
-            return {"f": [[[sent(a) for a in point], sent(v)] for point, v in table.items()], "d": sent(default)}
+            return {"f": [[[*map(part, point)], part(v)] for point, v in table.items()], "e": part(default)}
         case tuple():
-            return {"t": [sent(item) for item in value]}
+            return {"t": [*map(part, value)]}
 
 
 def received(data: Any, sort: sorts.Sort, what: str) -> Value:
-    """The value of the sort that the host's data stands for. Raises Malformed, in terms of `what`."""
+    """The value of the sort that the program's data stands for. Raises Malformed, in terms of `what`."""
     match sort, data:
         case sorts.BoolSort(), bool():
             return data
-        case ((sorts.IntegerSort() | sorts.NaturalSort() | sorts.RealSort()), int()) if not isinstance(data, bool):
-            return received({"q": [data, 1]}, sort, what)  # as `sent` has it
-        case ((sorts.IntegerSort() | sorts.NaturalSort() | sorts.RealSort()), {"q": [numerator, denominator]}):
-            number = Fraction(int(numerator), int(denominator))
-            if isinstance(sort, sorts.RealSort):
+        case ((sorts.IntegerSort() | sorts.NaturalSort() | sorts.RealSort()), _):
+            number = _number(data)
+            if number is not None and isinstance(sort, sorts.RealSort):
                 return number
-            if number.denominator == 1 and (number >= 0 or isinstance(sort, sorts.IntegerSort)):
+            if number is not None and number.denominator == 1 and (number >= 0 or isinstance(sort, sorts.IntegerSort)):
                 return int(number)
         case sorts.StringSort(), str():
             return data
@@ -73,12 +75,12 @@ def received(data: Any, sort: sorts.Sort, what: str) -> Value:
             made = _data(data, sort, what)
             if made is not None:
                 return made
-        case sorts.TupleSort(items=items), {"t": parts} if len(parts) == len(items):
+        case sorts.TupleSort(items=items), ({"t": parts} | {"l": parts}) if len(parts) == len(items):
             return tuple(received(part, item, what) for part, item in zip(parts, items, strict=True))
-        case sorts.TupleSort(items=items, labels=labels), {"m": pairs} if sorted(map(_label, pairs)) == sorted(labels):
+        case sorts.TupleSort(items=items, labels=labels), {"d": pairs} if sorted(map(_label, pairs)) == sorted(labels):
             named = {_label(pair): pair[1] for pair in pairs}
             return tuple(received(named[label], item, what) for label, item in zip(labels, items, strict=True))
-        case sorts.SequenceSort(item=item), {"t": parts}:
+        case sorts.SequenceSort(item=item), ({"t": parts} | {"l": parts}):
             return SequenceValue(tuple(received(part, item, what) for part in parts))
         case sorts.FunctionSort(), _:
             table = _function(data, sort, what)
@@ -87,6 +89,20 @@ def received(data: Any, sort: sorts.Sort, what: str) -> Value:
         case sorts.SetSort(), _:
             pass
     raise Malformed(f"{what} is {_shown(data)}, which is no value of {show_sort(sort)}")
+
+
+def _number(data: Any) -> Fraction | None:
+    match data:
+        case int() if not isinstance(data, bool):
+            return Fraction(data)
+        case {"i": digits}:
+            return Fraction(int(digits))
+        case {"q": [numerator, denominator]}:
+            return Fraction(int(numerator), int(denominator))
+        case {"f": str(text)} if math.isfinite(float.fromhex(text)):
+            return Fraction(float.fromhex(text))
+        case _:  # no number
+            return None
 
 
 def _label(pair: Any) -> str:
@@ -105,7 +121,7 @@ def _data(data: Any, sort: sorts.DataSort, what: str) -> Value | None:
 
 def _head(data: Any) -> tuple[str | None, list[Any]]:
     match data:
-        case {"t": [str(name), *arguments]}:
+        case {"t": [str(name), *arguments]} | {"l": [str(name), *arguments]}:
             return name, arguments
         case _:  # nothing applied
             return None, []
@@ -116,13 +132,11 @@ def _function(data: Any, sort: sorts.FunctionSort, what: str) -> Value | None:
     relation = isinstance(sort.result, sorts.BoolSort)
     rows: list[tuple[Any, Any]]
     match data:
-        case {"f": points, "d": rest}:
+        case {"f": points, "e": rest} | {"f": points, "d": rest}:  # the latter from an earlier ledger
             rows, default = [({"t": point}, value) for point, value in points], rest
-        case {"s": points} if relation:
+        case {"s": points} | {"t": points} | {"l": points} if relation:
             rows, default = [(point, True) for point in points], False
-        case {"t": points} if relation:
-            rows, default = [(point, True) for point in points], False
-        case {"m": pairs}:
+        case {"d": pairs}:
             given = [value for point, value in pairs if point == {"...": True}]
             if not given and not relation:
                 raise Malformed(f"{what} is a dict without a default (the key ...)")
@@ -140,7 +154,7 @@ def _function(data: Any, sort: sorts.FunctionSort, what: str) -> Value | None:
 def _point(data: Any, parameters: Sequence[sorts.Sort], what: str) -> tuple[Value, ...]:
     place = f"a point of {what}"
     match data:
-        case {"t": parts} if len(parts) == len(parameters):
+        case {"t": parts} | {"l": parts} if len(parts) == len(parameters):
             try:
                 return tuple(received(part, sort, place) for part, sort in zip(parts, parameters, strict=True))
             except Malformed:
@@ -156,29 +170,31 @@ def _shown(data: Any) -> str:
     match data:
         case {"?": what}:
             return str(what)
-        case {"q": [numerator, denominator]}:
-            return str(Fraction(int(numerator), int(denominator)))
-        case {"t": parts}:
+        case {"t": parts} | {"l": parts}:
             return f"({', '.join(map(_shown, parts))})"
         case {"s": parts}:
             return f"{{{', '.join(map(_shown, parts))}}}"
-        case {"m": _}:
-            return "a dict"
-        case {"f": _}:
+        case {"f": str(text)} if not math.isfinite(float.fromhex(text)):
+            return f"the number {float.fromhex(text)}"
+        case {"f": list()}:
             return "a table"
-        case _:  # shown as JSON
-            return repr(data)
+        case {"d": _}:
+            return "a dict"
+        case _:  # a number, or shown as JSON
+            number = _number(data)
+            return repr(data) if number is None else str(number)
 
 
-def outputs(data: Any, ports: Mapping[str, sorts.Sort]) -> dict[str, Value]:
-    """Every output from the returned data: a dict by name, or the one output itself. Raises Malformed."""
+def outputs(data: Any, ports: Mapping[str, sorts.Sort], but: Collection[str] = ()) -> dict[str, Value]:
+    """Every output from the returned data: a dict by name (except the names `but`), or the one output itself. Raises
+    Malformed."""
     found: dict[str, Any] = {}
     names = set(ports)
     match data:
-        case {"m": pairs} if all(isinstance(key, str) for key, _ in pairs) and (
-            len(names) != 1 or {key for key, _ in pairs} == names
+        case {"d": pairs} if all(isinstance(key, str) for key, _ in pairs) and (
+            len(names) != 1 or {key for key, _ in pairs} - {*but} == names
         ):
-            found = dict(pairs)
+            found = {key: value for key, value in pairs if key not in but}
         case _ if len(names) == 1:
             found = {next(iter(names)): data}
         case _:  # several names
@@ -213,12 +229,6 @@ def asked_with(inputs: Inputs, name: str, word: str) -> Pairs:
     return tuple((n, word if n == f"in.{name}" else value) for n, value in pairs(inputs, {}))
 
 
-def sent_inputs(inputs: Inputs, *, doubles: bool = False) -> dict[str, Any]:
-    """Inputs as JSON data for the host; `doubles`: the values are rounded, and numbers are sent as doubles."""
-    made = {name: sent(value) for name, value in inputs.items()}
-    return {name: _as_double(data) for name, data in made.items()} if doubles else made
-
-
 # -- machine numbers ---------------------------------------------------------------------------------------------------
 
 
@@ -227,19 +237,6 @@ EXACT, FINITE, ANY = "exact", "float64", "float64-with-nan"
 
 SPECIAL = {"-0": "-0x0.0p+0", "NaN": "nan", "infinity": "inf", "-infinity": "-inf"}
 """Names, and texts for Python (`float.fromhex`)."""
-
-
-def _as_double(data: Any) -> Any:
-    """The result of `sent` for a rounded value, with doubles in it."""
-    match data:
-        case {"q": [numerator, denominator]}:
-            return {"r": float(Fraction(numerator, denominator)).hex()}
-        case dict():
-            return {key: _as_double(part) for key, part in data.items()}
-        case list():
-            return [_as_double(part) for part in data]
-        case _:  # not a number
-            return data
 
 
 # -- values of the generated test --------------------------------------------------------------------------------------
@@ -290,45 +287,3 @@ def as_plain(value: Value, table: Any) -> Any:
             return table(points, as_plain(default, table))
         case _:  # a number, a truth value, a text
             return value
-
-
-# -- a driven class (`avow.drive.steps`) -------------------------------------------------------------------------------
-
-
-def as_step(value: Value, *, doubles: bool) -> Any:
-    """An input as a driven class gets it. Raises Malformed."""
-    match value:
-        case bool():
-            return value
-        case Fraction():
-            return {"f": float(value).hex()} if doubles else {"q": [str(value.numerator), str(value.denominator)]}
-        case int():
-            return {"i": str(value)}
-        case Element(name=name):
-            return name
-        case SequenceValue(items=items):
-            return {"l": [as_step(item, doubles=doubles) for item in items]}
-        case Data(constructor=constructor, arguments=arguments):
-            return {"t": [constructor, *(as_step(one, doubles=doubles) for one in arguments)]}
-        case tuple():
-            return {"t": [as_step(item, doubles=doubles) for item in value]}
-        case _:  # `subject` rejects such ports
-            raise Malformed(f"a step class is not given {value}")
-
-
-def from_step(data: Any, but: Collection[str] = ()) -> Any:
-    """The returned data of a class, in the form of a function's host; `but`: names of a dict that are left out."""
-    match data:
-        case {"f": str(text)}:
-            number = float.fromhex(text)
-            if not math.isfinite(number):
-                return {"?": f"the number {number}"}
-            return {"q": [str(part) for part in number.as_integer_ratio()]}
-        case {"i": str(digits)}:
-            return {"q": [digits, "1"], "w": True}
-        case {"l": items} | {"t": items}:
-            return {"t": [from_step(item) for item in items]}
-        case {"d": pairs}:
-            return {"m": [[key, from_step(value)] for key, value in pairs if key not in but]}
-        case _:  # its own JSON
-            return data

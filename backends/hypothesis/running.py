@@ -44,10 +44,9 @@ from .convention import (
     as_plain,
     as_value,
     asked_with,
-    from_step,
     pairs,
     received,
-    sent_inputs,
+    sent,
     told,
     valuation,
 )
@@ -381,8 +380,7 @@ class Bench:
             steps: list[Inputs] = []
             with contextlib.suppress(Malformed, KeyError, ValueError, TypeError, AttributeError):
                 for step in run:
-                    plain = {n: from_step(step[n]) if self.asked.driven else step[n] for n in self.inputs if n in step}
-                    steps.append({n: received(v, self.inputs[n], n) for n, v in plain.items()})
+                    steps.append({n: received(step[n], sort, n) for n, sort in self.inputs.items() if n in step})
             if len(steps) == len(run):
                 self.replayed += 1
                 self.traces = {**self._replayed(steps, *self.guarantees), **self.traces}
@@ -460,7 +458,7 @@ class Bench:
         if self.asked.driven:
             case: Any = [self.unit.step_of(inputs) for inputs, _ in trace]
         else:
-            steps = [sent_inputs(inputs) for inputs, _ in trace]
+            steps = [{n: sent(v, doubles=False) for n, v in inputs.items()} for inputs, _ in trace]
             case = steps if self.runs_counted else steps[0]
         shown = tuple(pairs(*step) for step in trace)
         return replace(found, failure=shown[-1], trace=shown if len(shown) > 1 else (), case=case)

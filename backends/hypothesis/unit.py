@@ -10,7 +10,7 @@ from typing import Any
 from avow.formulas.values import Value
 from avow.isolation.subject import SubjectFailed, SubjectProcess
 
-from .convention import EXACT, Inputs, Malformed, as_step, from_step, outputs, received, sent_inputs
+from .convention import EXACT, Inputs, Malformed, outputs, received, sent
 from .exchange import Question
 from .tuning import ASKED_AGAIN
 
@@ -33,20 +33,18 @@ class Unit:
 
     def advance(self, inputs: Inputs, instead: Mapping[str, str] | None = None) -> dict[str, Value]:
         """One step's outputs, with memory among them; `instead`: floats for some inputs. Raises SubjectFailed."""
-        if not self.asked.driven:
-            taken = {n: v for n, v in inputs.items() if self.asked.accepted is None or n in self.asked.accepted}
-            given = sent_inputs(taken, doubles=self.doubles)
-            return self.read(self.request(given | {n: {"r": text} for n, text in (instead or {}).items()}))
         step = self.step_of(inputs) | {n: {"f": text} for n, text in (instead or {}).items()}
+        if not self.asked.driven:
+            return self.read(self.request(step))
         (answer,) = self._drive({"on": True, "steps": [step]})["steps"]
         if "error" in answer:
             raise SubjectFailed(f"the step raises {answer['why']}")
         returned = {n: s for n, s in self.outputs.items() if n not in self.asked.held}
         unread = [name.removeprefix("out.") for name in self.asked.left_out if name.startswith("out.")]
         try:
-            found = outputs(from_step(answer["value"], unread), returned) if returned else {}
+            found = outputs(answer["value"], returned, unread) if returned else {}
             held = {n: v for n, v in answer["memory"].items() if n in self.outputs}
-            return found | {n: received(from_step(v), self.outputs[n], f"out.{n}") for n, v in held.items()}
+            return found | {n: received(v, self.outputs[n], f"out.{n}") for n, v in held.items()}
         except (Malformed, ValueError, TypeError, KeyError) as error:
             raise SubjectFailed(str(error)) from error
 
@@ -58,8 +56,10 @@ class Unit:
         return self._held(self._drive({"on": True, "steps": []})["held"])
 
     def step_of(self, inputs: Inputs) -> dict[str, Any]:
-        """Inputs in the form for a driven class."""
-        return {n: as_step(v, doubles=self.doubles) for n, v in inputs.items() if n not in self.asked.held}
+        """The inputs that are passed, as data."""
+        driven, accepted = self.asked.driven, self.asked.accepted
+        passed = inputs.keys() - self.asked.held.keys() if driven or accepted is None else inputs.keys() & accepted
+        return {n: sent(v, doubles=self.doubles, lists=driven) for n, v in inputs.items() if n in passed}
 
     def request(self, request: Any) -> Any:
         """The reply to a request. Raises SubjectFailed."""
@@ -87,7 +87,7 @@ class Unit:
         found: Inputs = {}
         for name, data in plain.items():
             try:
-                found[name] = received(from_step(data) if self.asked.driven else data, self.inputs[name], name)
+                found[name] = received(data, self.inputs[name], name)
             except (Malformed, ValueError):
                 continue
         return found
@@ -118,6 +118,6 @@ class Unit:
     def _held(self, data: Mapping[str, Any]) -> dict[str, Value]:
         names = [n for n in self.asked.held if n in self.inputs]
         try:
-            return {n: received(from_step(data[n]), self.inputs[n], f"in.{n}") for n in names}
+            return {n: received(data[n], self.inputs[n], f"in.{n}") for n in names}
         except Malformed as error:
             raise SubjectFailed(f"in memory, {error}") from error

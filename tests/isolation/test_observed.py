@@ -242,7 +242,7 @@ def outside(folder: Path, text: str) -> list[str]:
     """What a program whose module begins with a text uses that cannot be recorded."""
     (folder / "m.py").write_text(text + "def step(): return 10\n")
     subject = SubjectProcess(folder / "m.py", "step", 10.0)
-    assert subject.ask({}) == {"q": ["10", "1"], "w": True}
+    assert subject.ask({}) == {"i": "10"}
     assert not subject.close()
     return [o.path for o in subject.observed() if o.kind is Seen.OUTSIDE]
 
