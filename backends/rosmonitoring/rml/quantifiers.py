@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from fractions import Fraction
 
 from avow.base.tuning.bounds import ATOMS_MADE
 from avow.evaluation.evaluate import finite_values
@@ -109,7 +108,7 @@ class Eliminator:
             case t.Apply():
                 return self._apply(term, bound)
             case t.Variable(sort=s.BoolSort()):
-                return rml.compare("==", self._number(term, bound), rml.Number(Fraction(1)))
+                return rml.compare("==", self._number(term, bound), rml.ONE)
             case t.Quantified(quantifier=t.Quantifier.EXISTS):
                 return self._exists(term.variables, term.body, True, bound)
             case t.Quantified(quantifier=t.Quantifier.FORALL):
@@ -129,7 +128,7 @@ class Eliminator:
             known = self._value(term.left, bound)
             assert isinstance(known, Variant)
             assert isinstance(term.left.sort, s.DataSort)
-            return rml.compare(term.operator, known.tag, rml.Number(Fraction(code(term.left.sort, made))))
+            return rml.compare(term.operator, known.tag, rml.literal(code(term.left.sort, made)))
         if term.left.sort == s.BOOL:
             same = self._iff(term.left, term.right, bound)
             return same if term.operator == "==" else rml.opposite(same)
@@ -172,14 +171,14 @@ class Eliminator:
             case t.Variable():
                 return self.symbols[term.qualified]
             case t.EnumValue(name=name, sort=sort):
-                return Scalar(rml.Number(Fraction(code(sort, name))))
+                return Scalar(rml.literal(code(sort, name)))
             case t.Construct(constructor=name, arguments=arguments, sort=sort):
                 given = tuple(self._value(a, bound) for a in arguments)
                 rows = tuple(
-                    given if c.name == name else tuple(Scalar(rml.Number(Fraction(0))) for _ in c.parameters)
+                    given if c.name == name else tuple(Scalar(rml.ZERO) for _ in c.parameters)
                     for c in sort.constructors
                 )
-                return Variant(rml.Number(Fraction(code(sort, name))), rows)
+                return Variant(rml.literal(code(sort, name)), rows)
             case t.Argument(value=whole, constructor=name, position=position):
                 known = self._value(whole, bound)
                 assert isinstance(known, Variant)
@@ -191,11 +190,11 @@ class Eliminator:
     def _number(self, term: t.Term, bound: Bound) -> rml.Numeric:
         match term:
             case t.Literal(value=value) if not isinstance(value, str):
-                return rml.Number(Fraction(value))
+                return rml.literal(value)
             case t.Widen(term=inside):
                 return self._number(inside, bound)
             case t.Negative(term=inside):
-                return self._calculate("-", rml.Number(Fraction(0)), self._number(inside, bound), term)
+                return self._calculate("-", rml.ZERO, self._number(inside, bound), term)
             case t.Arithmetic(operator=operator, left=left, right=right):
                 return self._calculate(operator, self._number(left, bound), self._number(right, bound), term)
             case t.Variable() | t.Argument():
@@ -210,19 +209,10 @@ class Eliminator:
         raise rml.NotRml(f"{type(term).__name__.lower()} terms of this sort are not expressible in RML")
 
     def _calculate(self, operator: str, left: rml.Numeric, right: rml.Numeric, term: t.Term) -> rml.Numeric:
-        if isinstance(left, rml.Number) and isinstance(right, rml.Number):
-            match operator:
-                case "+":
-                    return rml.Number(left.value + right.value)
-                case "-":
-                    return rml.Number(left.value - right.value)
-                case "*":
-                    return rml.Number(left.value * right.value)
-                case "/" if right.value:
-                    return rml.Number(left.value / right.value)
-        if isinstance(term.sort, s.RealSort) or operator == "/":
+        found = rml.calculation(operator, left, right)
+        if isinstance(found, t.Arithmetic) and (isinstance(term.sort, s.RealSort) or operator == "/"):
             raise rml.NotRml("it calculates with REAL numbers, which the RML monitor does in floating point")
-        return rml.Calculation(operator, left, right)
+        return found
 
     def _unique(self, term: t.Quantified, bound: Bound) -> rml.Condition:
         """Exactly one."""
@@ -247,7 +237,7 @@ class Eliminator:
             if options is not None:
                 own = (*variables, *inner)
                 return rml.some([self._exists(own, option, truth, bound) for option, truth in options])
-        return self._solve(parts, (*variables, *inner), bound, rml.TRUE)
+        return self._solve(parts, (*variables, *inner), bound, t.TRUE)
 
     def _solve(
         self, parts: Sequence[Part], variables: Sequence[t.Variable], bound: Bound, given: rml.Condition
@@ -260,8 +250,8 @@ class Eliminator:
         pending = [p for p in parts if p.names & free.keys()]
         known = rml.every([self._part(p, bound) for p in ready])
         facts = rml.every([given, known])
-        if facts == rml.FALSE:
-            return rml.FALSE
+        if facts == t.FALSE:
+            return t.FALSE
         if not pending:
             return known
         for at, part in enumerate(pending):
@@ -289,7 +279,7 @@ class Eliminator:
                 found = [self._solve(pending, variables, {**bound, name: value}, facts) for value in values]
                 return rml.every([known, rml.some(found)])
             if any(name in p.names for p in pending) and isinstance(variable.sort, _INFINITE):
-                anything = rml.Name(f"{name}?{self._work}")
+                anything = rml.variable(f"{name}?{self._work}")
                 open_ = self._solve(pending, variables, {**bound, name: Scalar(anything)}, facts)
                 left = rml.without_exclusions(open_, anything)
                 if left is not None:
@@ -331,7 +321,7 @@ class Eliminator:
         return found if len(found) == len(cases) else None
 
     def _case(
-        self, left: t.Term, right: t.Term, free: Mapping[str, t.Variable], bound: Bound, holds: rml.Condition = rml.TRUE
+        self, left: t.Term, right: t.Term, free: Mapping[str, t.Variable], bound: Bound, holds: rml.Condition = t.TRUE
     ) -> _Case | None:
         """The case that both sides are equal, if that fixes a variable."""
         found = solved(t.Compare("==", left, right), free.values())

@@ -16,6 +16,7 @@ from typing import assert_never
 
 from avow.formulas.values import Data, Element, FunctionValue, Value
 from avow.language import sorts as s
+from avow.language import terms as t
 from avow.language.printer import show_sort
 from avow.language.sorts import BoolSort, DataSort, EnumSort, IntegerSort, NaturalSort, RealSort, Sort
 from avow.ros import definitions as wires
@@ -24,7 +25,21 @@ from avow.ros.bags import ENVELOPE
 from ..rules import Choice, Constant, FieldPath, Fields, Hold, Lookup, Previous, Rule
 from ..tuning import TRACKED_TUPLES
 from ..wires import parts_of
-from .syntax import TRUE, Comparison, Condition, Name, NotRml, Number, Numeric, compare, every, key, some, string
+from .syntax import (
+    ONE,
+    ZERO,
+    Condition,
+    NotRml,
+    Numeric,
+    compare,
+    every,
+    key,
+    literal,
+    some,
+    string,
+    value_of,
+    variable,
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,7 +49,7 @@ class Case:
     fields: tuple[tuple[FieldPath, str], ...]
     values: tuple[Numeric, ...]
     binds: tuple[str, ...]
-    guard: Condition = TRUE
+    guard: Condition = t.TRUE
 
 
 def choice_cases(rule: Choice, sort: DataSort, stem: str) -> list[Case]:
@@ -59,10 +74,10 @@ def choice_cases(rule: Choice, sort: DataSort, stem: str) -> list[Case]:
         ]
         for parts in product(*per_field):
             whole = together((), parts)
-            values: list[Numeric] = [Number(Fraction(code(sort, constructor.name)))]
+            values: list[Numeric] = [literal(code(sort, constructor.name))]
             for other in sort.constructors:
                 mine = other.name == constructor.name
-                values += whole.values if mine else [Number(Fraction(0))] * width[other.name]
+                values += whole.values if mine else [ZERO] * width[other.name]
             found.append(Case((tag, *whole.fields), tuple(values), whole.binds, whole.guard))
     return found
 
@@ -93,16 +108,14 @@ def field_cases(path: FieldPath, sort: Sort, name: str, names: Mapping[str, str]
             for member in members:
                 words = _words(member, names)
                 if words:
-                    found.append(Case(((path, " | ".join(words)),), (Number(Fraction(code(sort, member))),), ()))
+                    found.append(Case(((path, " | ".join(words)),), (literal(code(sort, member)),), ()))
             return found
         case BoolSort():
-            return [
-                Case(((path, word),), (Number(Fraction(number)),), ()) for word, number in (("false", 0), ("true", 1))
-            ]
+            return [Case(((path, word),), (literal(number),), ()) for word, number in (("false", 0), ("true", 1))]
         case NaturalSort():
-            return [Case(((path, name),), (Name(name),), (name,), compare(">=", Name(name), Number(Fraction(0))))]
+            return [Case(((path, name),), (variable(name),), (name,), compare(">=", variable(name), ZERO))]
         case RealSort() | IntegerSort():
-            return [Case(((path, name),), (Name(name),), (name,))]
+            return [Case(((path, name),), (variable(name),), (name,))]
         case _:
             raise NotRml(f"a field holds a value of {show_sort(sort)}")
 
@@ -176,15 +189,15 @@ class Tracked:
         """The condition that the relation holds there. Raises NotRml."""
         at: list[Fraction] = []
         for argument in arguments:
-            if not isinstance(argument, Scalar) or not isinstance(argument.number, Number):
+            if not isinstance(argument, Scalar) or not isinstance(argument.number, t.Literal):
                 raise NotRml(
                     "it asks a relation that holds of all tuples seen for a tuple that is not known beforehand"
                 )
-            at.append(argument.number.value)
+            at.append(value_of(argument.number))
         name = self.flags.setdefault(tuple(at), f"{self.prefix}_{len(self.flags) + 1}")
         if len(self.flags) > TRACKED_TUPLES:
             raise NotRml(f"it asks a relation for more than {TRACKED_TUPLES} tuples")
-        return compare("==", Name(name), Number(Fraction(1)))
+        return compare("==", variable(name), ONE)
 
 
 @dataclass(frozen=True, slots=True)
@@ -207,20 +220,20 @@ def constant(value: Value, sort: s.Sort) -> Symbol:
     """A known value. Raises NotRml."""
     match value:
         case bool() | int() | Fraction():
-            return Scalar(Number(Fraction(value)))
+            return Scalar(literal(value))
         case Element(name=name) if isinstance(sort, s.EnumSort):
-            return Scalar(Number(Fraction(code(sort, name))))
+            return Scalar(literal(code(sort, name)))
         case Data(constructor=name, arguments=arguments) if isinstance(sort, s.DataSort):
             chosen = sort.constructor(name)
             parts = tuple(constant(a, part) for a, part in zip(arguments, chosen.parameters, strict=True))
             others = tuple(
                 parts if c.name == name else tuple(blank(p) for p in c.parameters) for c in sort.constructors
             )
-            return Variant(Number(Fraction(code(sort, name))), others)
+            return Variant(literal(code(sort, name)), others)
         case FunctionValue(table=table, default=False) if isinstance(sort, s.FunctionSort):
             points = [k for k, v in table.items() if v is True]
             tuples = tuple(
-                (TRUE, tuple(constant(a, part) for a, part in zip(k, sort.parameters, strict=True))) for k in points
+                (t.TRUE, tuple(constant(a, part) for a, part in zip(k, sort.parameters, strict=True))) for k in points
             )
             return Points(tuples)
         case FunctionValue(table=table, default=default) if isinstance(sort, s.FunctionSort) and sort.result != s.BOOL:
@@ -237,7 +250,7 @@ def blank(sort: s.Sort) -> Symbol:
     """The number in the places of an absent value. Raises NotRml."""
     if isinstance(sort, s.NotScalar):
         raise NotRml("an argument of a constructor that is no number, truth value or enumeration")
-    return Scalar(Number(Fraction(0)))
+    return Scalar(ZERO)
 
 
 def carried(rule: Rule, rules: dict[str, Rule], prefix: str) -> Symbol:
@@ -258,23 +271,23 @@ def carried(rule: Rule, rules: dict[str, Rule], prefix: str) -> Symbol:
             if elsewhere is None:
                 raise NotRml(f"{name} is a function without a value `elsewhere`")
             return Table(((parts[:-1], parts[-1]),), constant(elsewhere, sort.result))
-        return Points(((compare("==", Name(f"{prefix}_p"), Number(Fraction(1))), parts),))
+        return Points(((compare("==", variable(f"{prefix}_p"), ONE), parts),))
     return _named(sort, prefix, name)
 
 
 def _named(sort: s.Sort, prefix: str, name: str) -> Symbol:
     match sort:
         case s.BoolSort() | s.RealSort() | s.IntegerSort() | s.NaturalSort() | s.EnumSort():
-            return Scalar(Name(prefix))
+            return Scalar(variable(prefix))
         case s.DataSort(constructors=constructors):
             arguments = []
             for at, constructor in enumerate(constructors, start=1):
                 row: list[Symbol] = []
                 for k, parameter in enumerate(constructor.parameters, start=1):
                     blank(parameter)
-                    row.append(Scalar(Name(f"{prefix}_{at}_{k}")))
+                    row.append(Scalar(variable(f"{prefix}_{at}_{k}")))
                 arguments.append(tuple(row))
-            return Variant(Name(f"{prefix}_t"), tuple(arguments))
+            return Variant(variable(f"{prefix}_t"), tuple(arguments))
         case s.StringSort() | s.OpaqueSort() | s.FunctionSort() | s.TupleSort() | s.SequenceSort() | s.SetSort():
             raise NotRml(f"{name} is of a sort that RML's equations cannot carry")
         case _:
@@ -303,7 +316,7 @@ def equal(left: Symbol, right: Symbol) -> Condition:
             same = compare("==", left.tag, right.tag)
             cases = []
             for at, (mine, theirs) in enumerate(zip(left.arguments, right.arguments, strict=True), start=1):
-                other_tag = compare("!=", left.tag, Number(Fraction(at)))
+                other_tag = compare("!=", left.tag, literal(at))
                 cases.append(some([other_tag, every([equal(a, b) for a, b in zip(mine, theirs, strict=True)])]))
             return every([same, *cases])
         case _:
@@ -313,13 +326,13 @@ def equal(left: Symbol, right: Symbol) -> Condition:
 def components(symbol: Symbol) -> tuple[str, ...]:
     """The names of the parts that an equation carries for it, in order."""
     match symbol:
-        case Scalar(number=Name(name=name)):
+        case Scalar(number=t.Variable(name=name)):
             return (name,)
-        case Variant(tag=Name(name=name), arguments=arguments):
+        case Variant(tag=t.Variable(name=name), arguments=arguments):
             return (name, *(part for row in arguments for a in row for part in components(a)))
         case Tracked(flags=flags):
             return tuple(flags.values())
-        case Points(tuples=((Comparison(left=Name(name=flag)), parts),)):
+        case Points(tuples=((t.Compare(left=t.Variable(name=flag)), parts),)):
             return (flag, *(part for p in parts for part in components(p)))
         case Table(points=((arguments, result),)):
             return tuple(part for symbol in (*arguments, result) for part in components(symbol))

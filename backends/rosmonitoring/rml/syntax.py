@@ -7,11 +7,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from decimal import Decimal
 from fractions import Fraction
-from typing import assert_never
 
 from avow.base.plain import decimal
 from avow.formulas.flattening import joined
-from avow.language.operators import OPPOSITE
+from avow.formulas.formula import free_variables
+from avow.formulas.formula import opposite as negated
+from avow.formulas.formula import substitute as put
+from avow.language import terms as t
+from avow.language.sorts import REAL
 
 KEYWORDS = frozenset(
     "not matches with empty all var let if else abs sin cos tan min max true false null any none".split()  # noqa: SIM905
@@ -27,163 +30,138 @@ class NotRml(Exception):  # noqa: N818 - it says what a text or a formula is
 # -- numbers and conditions --------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True, slots=True)
-class Name:
-    name: str
-
-
-@dataclass(frozen=True, slots=True)
-class Number:
-    value: Fraction
-
-
-@dataclass(frozen=True, slots=True)
-class Calculation:
-    operator: str
-    left: Numeric
-    right: Numeric
-
-
-Numeric = Name | Number | Calculation
+Numeric = t.Term
+"""A REAL term: a literal, a variable, `+`, `-`, `*`, or a `max` or `min` of two numbers."""
+Condition = t.Term
+"""A comparison of numbers, `and`, `or`, TRUE or FALSE."""
 FUNCTIONS = ("max", "min")
-"""Operators of a `Calculation` that are written as functions."""
+"""Operators that are written as functions."""
 
 
-@dataclass(frozen=True, slots=True)
-class Comparison:
-    operator: str
-    left: Numeric
-    right: Numeric
+def variable(name: str) -> t.Variable:
+    return t.Variable(t.Role.BOUND, name, REAL)
 
 
-@dataclass(frozen=True, slots=True)
-class Every:
-    """Conjunction; empty: true."""
-
-    items: tuple[Condition, ...] = ()
+def literal(value: Fraction | int) -> t.Literal:
+    return t.Literal(Fraction(value), REAL)
 
 
-@dataclass(frozen=True, slots=True)
-class Some:
-    """Disjunction; empty: false."""
-
-    items: tuple[Condition, ...] = ()
+ZERO, ONE = literal(0), literal(1)
 
 
-Condition = Comparison | Every | Some
-TRUE, FALSE = Every(), Some()
+def value_of(number: t.Literal) -> Fraction:
+    assert isinstance(number.value, Fraction)
+    return number.value
+
+
+def calculation(operator: str, left: Numeric, right: Numeric) -> Numeric:
+    """A calculation, done at once if both sides are numbers."""
+    if isinstance(left, t.Literal) and isinstance(right, t.Literal):
+        a, b = value_of(left), value_of(right)
+        if operator != "/":
+            return literal({"+": a + b, "-": a - b, "*": a * b, "max": max(a, b), "min": min(a, b)}[operator])
+        if b:
+            return literal(a / b)
+    return t.Arithmetic(operator, left, right, REAL)
 
 
 def compare(operator: str, left: Numeric, right: Numeric) -> Condition:
     """A comparison, decided at once if both sides are numbers."""
-    if isinstance(left, Number) and isinstance(right, Number):
-        a, b = left.value, right.value
+    if isinstance(left, t.Literal) and isinstance(right, t.Literal):
+        a, b = value_of(left), value_of(right)
         holds = {"<": a < b, "<=": a <= b, ">": a > b, ">=": a >= b, "==": a == b, "!=": a != b}[operator]
-        return TRUE if holds else FALSE
+        return t.TRUE if holds else t.FALSE
     if left == right:
-        return TRUE if operator in ("<=", ">=", "==") else FALSE
-    return Comparison(operator, left, right)
+        return t.TRUE if operator in ("<=", ">=", "==") else t.FALSE
+    return t.Compare(operator, left, right)
 
 
 def every(items: list[Condition] | tuple[Condition, ...]) -> Condition:
-    """The conjunction; FALSE if a comparison contradicts the rest."""
-    found = joined(items, Every, TRUE, FALSE, once=True)
-    excluded = {opposite(item) for item in _parts(found, Every) if isinstance(item, Comparison)}
+    """The conjunction; t.FALSE if a comparison contradicts the rest."""
+    found = joined(items, t.And, t.TRUE, t.FALSE, once=True)
+    excluded = {opposite(item) for item in _parts(found, t.And) if isinstance(item, t.Compare)}
     kept = [
-        some([i for i in item.items if i not in excluded]) if isinstance(item, Some) else item
-        for item in _parts(found, Every)
+        some([i for i in item.items if i not in excluded]) if isinstance(item, t.Or) else item
+        for item in _parts(found, t.And)
     ]
     if any(item in excluded for item in kept):
-        return FALSE
-    return found if kept == list(_parts(found, Every)) else every(kept)
+        return t.FALSE
+    return found if kept == list(_parts(found, t.And)) else every(kept)
 
 
 def some(items: list[Condition] | tuple[Condition, ...]) -> Condition:
-    """The disjunction; TRUE if one item is another's opposite."""
-    found = joined(items, Some, FALSE, TRUE, once=True)
-    implied = {opposite(item) for item in _parts(found, Some) if isinstance(item, Comparison)}
-    return TRUE if any(item in implied for item in _parts(found, Some)) else found
+    """The disjunction; t.TRUE if one item is another's opposite."""
+    found = joined(items, t.Or, t.FALSE, t.TRUE, once=True)
+    implied = {opposite(item) for item in _parts(found, t.Or) if isinstance(item, t.Compare)}
+    return t.TRUE if any(item in implied for item in _parts(found, t.Or)) else found
 
 
-def _parts(condition: Condition, kind: type[Every | Some]) -> tuple[Condition, ...]:
+def _parts(condition: Condition, kind: type[t.And | t.Or]) -> tuple[Condition, ...]:
     return condition.items if isinstance(condition, kind) else (condition,)
 
 
 def opposite(condition: Condition) -> Condition:
     match condition:
-        case Comparison(operator=operator, left=left, right=right):
-            return Comparison(OPPOSITE[operator], left, right)
-        case Every(items=items):
+        case t.And(items=items):
             return some([opposite(item) for item in items])
-        case Some(items=items):
+        case t.Or(items=items):
             return every([opposite(item) for item in items])
+        case _:  # a comparison, or a truth value
+            return negated(condition)
 
 
 def negations(complete: Condition) -> list[Condition]:
     """For each part of a condition that all values are present, the condition that it is missing."""
-    parts = complete.items if not isinstance(complete, Comparison) else (complete,)
-    return [compare("!=", p.left, p.right) for p in parts if isinstance(p, Comparison)]
+    return [compare("!=", p.left, p.right) for p in _parts(complete, t.And) if isinstance(p, t.Compare)]
 
 
 def substitute(condition: Condition, new: Mapping[str, Numeric]) -> Condition:
     """The condition with numbers substituted for names."""
-    if isinstance(condition, Comparison):
-        return compare(condition.operator, _put(condition.left, new), _put(condition.right, new))
-    items = [substitute(item, new) for item in condition.items]
-    return every(items) if isinstance(condition, Every) else some(items)
+    if isinstance(condition, t.And | t.Or):
+        items = [substitute(item, new) for item in condition.items]
+        return every(items) if isinstance(condition, t.And) else some(items)
+    if not isinstance(condition, t.Compare):
+        return condition
+    terms = {variable(name): number for name, number in new.items()}
+    return compare(condition.operator, put(condition.left, terms), put(condition.right, terms))
 
 
-def _put(number: Numeric, new: Mapping[str, Numeric]) -> Numeric:
-    match number:
-        case Name(name=name):
-            return new.get(name, number)
-        case Calculation(operator=operator, left=left, right=right):
-            return Calculation(operator, _put(left, new), _put(right, new))
-        case Number():  # a number that is written down
-            return number
-        case _:
-            assert_never(number)
-
-
-def without_exclusions(condition: Condition, name: Name) -> Condition | None:
+def without_exclusions(condition: Condition, name: t.Variable) -> Condition | None:
     """The condition that `condition` holds for some of infinitely many numbers, if it only excludes certain numbers:
     these are finitely many. None if it says more."""
     match condition:
-        case Comparison(operator="!=", left=left, right=right) if _slope(left, name) != _slope(right, name):
-            return TRUE if None not in (_slope(left, name), _slope(right, name)) else None
-        case Comparison():
-            return condition if name.name not in names_in(condition) else None
-        case Every(items=items) | Some(items=items):
+        case t.Compare(operator="!=", left=left, right=right) if _slope(left, name) != _slope(right, name):
+            return t.TRUE if None not in (_slope(left, name), _slope(right, name)) else None
+        case t.And(items=items) | t.Or(items=items):
             found = [part for item in items if (part := without_exclusions(item, name)) is not None]
+<<<<<<< HEAD
             return (every if isinstance(condition, Every) else some)(found) if len(found) == len(items) else None
+=======
+            joined_up = every if isinstance(condition, t.And) else some
+            return joined_up(found) if len(found) == len(items) else None
+        case _:  # a comparison, or a truth value
+            return condition if name.name not in names_in(condition) else None
+>>>>>>> caf1e2c1 (RML: its conditions are core terms (21 lines))
 
 
-def _slope(number: Numeric, name: Name) -> int | None:
+def _slope(number: Numeric, name: t.Variable) -> int | None:
     """How often the name is added in a sum; None if it is no sum."""
     match number:
-        case Name() | Number():
-            return int(number == name)
-        case Calculation(operator="+" | "-" as operator, left=left, right=right):
+        case t.Arithmetic(operator="+" | "-" as operator, left=left, right=right):
             one, other = _slope(left, name), _slope(right, name)
             return None if one is None or other is None else one + other if operator == "+" else one - other
-        case Calculation():
+        case t.Arithmetic():
             return None if name.name in names_in(number) else 0
+        case _:  # a name, or a number
+            return int(number == name)
 
 
 def size(condition: Condition) -> int:
-    return 1 if isinstance(condition, Comparison) else 1 + sum(map(size, condition.items))
+    return 1 + sum(map(size, condition.items)) if isinstance(condition, t.And | t.Or) else 1
 
 
-def names_in(condition: Condition | Numeric) -> frozenset[str]:
-    match condition:
-        case Name(name=name):
-            return frozenset((name,))
-        case Number():
-            return frozenset()
-        case Calculation(left=left, right=right) | Comparison(left=left, right=right):
-            return names_in(left) | names_in(right)
-        case Every(items=items) | Some(items=items):
-            return frozenset[str]().union(*map(names_in, items))
+def names_in(term: t.Term) -> frozenset[str]:
+    return frozenset(variable.name for variable in free_variables(term))
 
 
 # -- specifications ----------------------------------------------------------------------------------------------------
@@ -196,7 +174,7 @@ class EventType:
     name: str
     parameters: tuple[str, ...]
     patterns: tuple[str, ...]
-    condition: Condition = TRUE
+    condition: Condition = t.TRUE
 
 
 @dataclass(frozen=True, slots=True)
@@ -268,28 +246,28 @@ def _of_double(value: Fraction) -> str:
 
 def numeric(value: Numeric) -> str:
     match value:
-        case Name(name=name):
+        case t.Variable(name=name):
             return name
-        case Number(value=amount):
-            return number(amount) if amount >= 0 else f"(0 - {number(-amount)})"
-        case Calculation(operator=operator, left=left, right=right):
+        case t.Arithmetic(operator=operator, left=left, right=right):
             if operator in FUNCTIONS:
                 return f"{operator}({numeric(left)}, {numeric(right)})"
             return f"({numeric(left)} {operator} {numeric(right)})"
+        case t.Literal():
+            amount = value_of(value)
+            return number(amount) if amount >= 0 else f"(0 - {number(-amount)})"
+    raise AssertionError(value)
 
 
 def _condition_text(condition: Condition) -> str:
     match condition:
-        case Comparison(operator=operator, left=left, right=right):
+        case t.Compare(operator=operator, left=left, right=right):
             return f"{numeric(left)} {operator} {numeric(right)}"
-        case Every(items=()):
-            return "0 == 0"
-        case Some(items=()):
-            return "0 == 1"
-        case Every(items=items):
+        case t.And(items=items):
             return f"({' && '.join(map(_condition_text, items))})"
-        case Some(items=items):
+        case t.Or(items=items):
             return f"({' || '.join(map(_condition_text, items))})"
+        case _:  # a truth value
+            return "0 == 0" if condition == t.TRUE else "0 == 1"
 
 
 def write(specification: Specification) -> str:
@@ -310,7 +288,7 @@ def write(specification: Specification) -> str:
 
 def _event_text(event: EventType) -> str:
     head = event.name + (f"({', '.join(event.parameters)})" if event.parameters else "")
-    guard = "" if event.condition == TRUE else f"\n  with {_condition_text(event.condition)}"
+    guard = "" if event.condition == t.TRUE else f"\n  with {_condition_text(event.condition)}"
     return f"{head} matches {' | '.join(event.patterns)}{guard};"
 
 

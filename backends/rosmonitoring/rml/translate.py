@@ -11,7 +11,6 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from fractions import Fraction
 from itertools import count, product
 from pathlib import PurePath
 from typing import assert_never
@@ -19,6 +18,7 @@ from typing import assert_never
 from avow.backend_kit.one_step import refusal
 from avow.evaluation.evaluate import free_names
 from avow.formulas.values import Value
+from avow.language import terms as t
 from avow.language.contract import Clause
 from avow.language.sorts import DataSort, FunctionSort, RealSort, Sort, StringSort
 from avow.language.terms import Role
@@ -190,7 +190,7 @@ class _Machine:
         self._choose(names)
         guard = Eliminator(self.symbols).condition(self.clause.formula)
         complete = rml.every(
-            [rml.compare("==", rml.Name(self.flags[n]), rml.Number(Fraction(1))) for n in names if n in self.flags]
+            [rml.compare("==", rml.variable(self.flags[n]), rml.ONE) for n in names if n in self.flags]
         )
         judged = rml.some([*rml.negations(complete), guard])
         triggers = triggers_of(self.setup, tuple(names))
@@ -212,21 +212,19 @@ class _Machine:
         initial = self._initial(state)
         self.state, self.initial = tuple(state[k] for k in kept), tuple(initial[k] for k in kept)
         self.drafts = _merged(replace(draft, then=tuple(draft.then[k] for k in kept)) for draft in drafts)
-        self.relevant = (), tuple(sym.pattern(self._written(topic), ()) for topic in by_topic), rml.TRUE
+        self.relevant = (), tuple(sym.pattern(self._written(topic), ()) for topic in by_topic), t.TRUE
 
     def _modes(self, judged: rml.Condition, updated: Sequence[str], triggers: Sequence[str]) -> list[_Mode]:
         """As in `engine.Monitor`: judged once each of its outputs has been published again, and not before."""
         mine = [n for n in triggers if n in updated]
         if not mine:
-            return [_Mode(rml.TRUE, {}, judged=False)]
+            return [_Mode(t.TRUE, {}, judged=False)]
         others = [self.fresh[n] for n in triggers if n not in updated and n in self.fresh]
-        ready = rml.every([rml.compare("==", rml.Name(f), rml.Number(Fraction(1))) for f in others])
-        now = _Mode(
-            rml.every([ready, judged]), dict.fromkeys(self.fresh.values(), rml.Number(Fraction(0))), judged=True
-        )
+        ready = rml.every([rml.compare("==", rml.variable(f), rml.ONE) for f in others])
+        now = _Mode(rml.every([ready, judged]), dict.fromkeys(self.fresh.values(), rml.ZERO), judged=True)
         if not others:
             return [now]
-        begun: dict[str, rml.Numeric] = {self.fresh[n]: rml.Number(Fraction(1)) for n in mine}
+        begun: dict[str, rml.Numeric] = {self.fresh[n]: rml.ONE for n in mine}
         return [now, _Mode(rml.opposite(ready), begun, judged=False)]
 
     def _needed(self, state: Sequence[str], drafts: Sequence[_Draft]) -> set[str]:
@@ -288,7 +286,7 @@ class _Machine:
         return found
 
     def _initial(self, state: Sequence[str]) -> list[rml.Numeric]:
-        values: dict[str, rml.Numeric] = {name: rml.Number(Fraction(0)) for name in state}
+        values: dict[str, rml.Numeric] = dict.fromkeys(state, rml.ZERO)
         for name, rule in self.rules.items():
             first = None if isinstance(rule, Constant) else self._first(rule)
             if first is not None:
@@ -309,10 +307,10 @@ class _Machine:
             new: dict[str, rml.Numeric] = {}
             for name, case in zip(updated, cases, strict=True):
                 if name in self.flags:
-                    new[self.flags[name]] = rml.Number(Fraction(1))
+                    new[self.flags[name]] = rml.ONE
                 new.update(zip(sym.components(self.symbols[name]), case.values, strict=True))
             guard = rml.every([*(case.guard for case in cases), rml.substitute(mode.guard, new)])
-            if guard == rml.FALSE:
+            if guard == t.FALSE:
                 continue
             binds = tuple(b for case in cases for b in case.binds)
             used = tuple(n for n in state if n in rml.names_in(guard))
@@ -321,8 +319,8 @@ class _Machine:
             for name, rule in self.rules.items():
                 if isinstance(rule, Previous):
                     after.update(self._follow(name, rule, updated, new, mode))
-            then = tuple(after.get(n, rml.Name(n)) for n in state)
-            judged = mode.judged and mode.guard != rml.TRUE
+            then = tuple(after.get(n, rml.variable(n)) for n in state)
+            judged = mode.judged and mode.guard != t.TRUE
             yield _Draft(self._written(topic), fields, binds, used, guard, then, judged)
 
     def _follow(
@@ -333,8 +331,8 @@ class _Machine:
         if not (mode.judged if rule.source in self.fresh else rule.source in updated):
             return {}
         mine, theirs = sym.components(self.symbols[name]), sym.components(self.symbols[rule.source])
-        found: dict[str, rml.Numeric] = {self.flags[name]: rml.Number(Fraction(1))} if name in self.flags else {}
-        found.update((m, new.get(t, rml.Name(t))) for m, t in zip(mine, theirs, strict=True))
+        found: dict[str, rml.Numeric] = {self.flags[name]: rml.ONE} if name in self.flags else {}
+        found.update((m, new.get(other, rml.variable(other))) for m, other in zip(mine, theirs, strict=True))
         return found
 
     def _cases(self, name: str) -> list[sym.Case]:
@@ -353,7 +351,7 @@ class _Machine:
                         raise rml.NotRml(f"{name} holds of all tuples seen, and these are of real numbers")
                     return [_tracked_case(symbol, parts) for parts in product(*per_field)]
                 relation = isinstance(symbol, sym.Points)
-                first: tuple[rml.Numeric, ...] = (rml.Number(Fraction(1)),) if relation else ()
+                first: tuple[rml.Numeric, ...] = (rml.ONE,) if relation else ()
                 return [sym.together(first, parts) for parts in product(*per_field)]
             case Choice(variable=variable):
                 assert isinstance(variable.sort, DataSort)
@@ -378,14 +376,14 @@ def _tracked_case(symbol: sym.Tracked, parts: Sequence[sym.Case]) -> sym.Case:
     """A message sets the number of its tuple to 1: ``1 - (1 - n) * min(1, |value - asked|)``. RML's own monitor
     evaluates an argument only if its outermost operator is a sum or a product."""
     whole = sym.together((), parts)
-    one, nothing = rml.Number(Fraction(1)), rml.Number(Fraction(0))
+    one, nothing = rml.ONE, rml.ZERO
     values: list[rml.Numeric] = []
     for at, flag in symbol.flags.items():
         apart: rml.Numeric = nothing
         for value, asked in zip(whole.values, at, strict=True):
-            sides = _calculated("-", value, rml.Number(asked)), _calculated("-", rml.Number(asked), value)
+            sides = _calculated("-", value, rml.literal(asked)), _calculated("-", rml.literal(asked), value)
             apart = _calculated("+", _calculated("max", *sides), apart)
-        unseen = _calculated("*", _calculated("-", one, rml.Name(flag)), _calculated("min", one, apart))
+        unseen = _calculated("*", _calculated("-", one, rml.variable(flag)), _calculated("min", one, apart))
         values.append(_calculated("-", one, unseen))
     return replace(whole, values=tuple(values))
 
@@ -393,14 +391,12 @@ def _tracked_case(symbol: sym.Tracked, parts: Sequence[sym.Case]) -> sym.Case:
 def _calculated(operator: str, left: rml.Numeric, right: rml.Numeric) -> rml.Numeric:
     """The calculation, simplified as far as possible."""
     match operator, left, right:
-        case _, rml.Number(value=a), rml.Number(value=b):
-            return rml.Number({"+": a + b, "-": a - b, "*": a * b, "max": max(a, b), "min": min(a, b)}[operator])
-        case "+" | "-", other, rml.Number(value=0):
+        case "+" | "-", other, t.Literal(value=0):
             return other
-        case "*", _, rml.Number(value=0):
+        case "*", _, t.Literal(value=0):
             return right
-        case _:  # it contains names
-            return rml.Calculation(operator, left, right)
+        case _:  # as it is
+            return rml.calculation(operator, left, right)
 
 
 def _seen_at_start(symbol: sym.Tracked, first: Value, sort: Sort) -> dict[str, rml.Numeric]:
@@ -408,8 +404,8 @@ def _seen_at_start(symbol: sym.Tracked, first: Value, sort: Sort) -> dict[str, r
     assert isinstance(known, sym.Points)
     seen = set()
     for _, parts in known.tuples:
-        seen.add(tuple(p.number.value for p in parts if isinstance(p, sym.Scalar) and isinstance(p.number, rml.Number)))
-    return {flag: rml.Number(Fraction(at in seen)) for at, flag in symbol.flags.items()}
+        seen.add(tuple(n.value for p in parts for n in _numbers(p, sort) if isinstance(n, t.Literal)))
+    return {flag: rml.literal(at in seen) for at, flag in symbol.flags.items()}
 
 
 def _numbers(symbol: sym.Symbol, sort: Sort) -> list[rml.Numeric]:
@@ -420,9 +416,9 @@ def _numbers(symbol: sym.Symbol, sort: Sort) -> list[rml.Numeric]:
         case sym.Variant(tag=tag, arguments=arguments):
             return [tag, *(n for row in arguments for a in row for n in _numbers(a, sort))]
         case sym.Points(tuples=()) if isinstance(sort, FunctionSort):
-            return [rml.Number(Fraction(0))] * (1 + len(sort.parameters))
+            return [rml.ZERO] * (1 + len(sort.parameters))
         case sym.Points(tuples=((_, parts),)):
-            return [rml.Number(Fraction(1)), *(n for p in parts for n in _numbers(p, sort))]
+            return [rml.ONE, *(n for p in parts for n in _numbers(p, sort))]
         case sym.Table(points=((arguments, result),)):
             return [n for part in (*arguments, result) for n in _numbers(part, sort)]
         case sym.Points() | sym.Tracked() | sym.Table():
