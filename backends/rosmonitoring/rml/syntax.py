@@ -134,14 +134,9 @@ def without_exclusions(condition: Condition, name: t.Variable) -> Condition | No
             return t.TRUE if None not in (_slope(left, name), _slope(right, name)) else None
         case t.And(items=items) | t.Or(items=items):
             found = [part for item in items if (part := without_exclusions(item, name)) is not None]
-<<<<<<< HEAD
-            return (every if isinstance(condition, Every) else some)(found) if len(found) == len(items) else None
-=======
-            joined_up = every if isinstance(condition, t.And) else some
-            return joined_up(found) if len(found) == len(items) else None
+            return (every if isinstance(condition, t.And) else some)(found) if len(found) == len(items) else None
         case _:  # a comparison, or a truth value
             return condition if name.name not in names_in(condition) else None
->>>>>>> caf1e2c1 (RML: its conditions are core terms (21 lines))
 
 
 def _slope(number: Numeric, name: t.Variable) -> int | None:
