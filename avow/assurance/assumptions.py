@@ -17,7 +17,7 @@ from avow.assurance.facts import Facts
 from avow.assurance.findings import takes
 from avow.assurance.model import ObligationView
 from avow.assurance.naming import short
-from avow.assurance.relied import Judged, Relied, looked_at, seen
+from avow.assurance.relied import Judged, Relied, differs, looked_at, seen
 from avow.assurance.support import assumption_claim
 from avow.base.records import dataclass
 from avow.base.verdict import HypothesisKind, Object
@@ -230,6 +230,7 @@ def _of_evidence(
 ) -> Iterator[_Raw]:
     """The assumptions that no record states: that the program behaves like its model, that untried cases are like those
     tried, that the platform behaves as expected, and that the tools answer correctly."""
+    programs = [view for view in views if view.obligation.kind is Kind.PROGRAM]
     for view in views:
         if view.id not in relied or view.obligation.kind is not Kind.GUARANTEE:
             continue
@@ -238,7 +239,7 @@ def _of_evidence(
         if looked_at(found) is None:  # a person's statement
             continue
         about = [(Sort.PLATFORM, PLATFORM, ""), (Sort.TOOLS, TOOLS, record.tool or record.backend)]
-        if record.of is Object.MODEL:
+        if record.of is Object.MODEL and not differs(programs, view.obligation, record):
             about.append((Sort.MODELS, MODELS, f"{name} by {record.method}"))
         if found.status in (Status.TESTED, Status.MONITORED):
             about.append((Sort.SAMPLING, SAMPLES, f"{name}: {seen(found)}"))

@@ -38,7 +38,7 @@ from datetime import date
 
 from avow.assurance.answers import EARLIER
 from avow.assurance.assumptions import Statements, assumptions
-from avow.assurance.certification import ProofView, proof_views, standing, trusted_base
+from avow.assurance.certification import Grade, ProofView, proof_views, standing, trusted_base
 from avow.assurance.changes import changes
 from avow.assurance.closure import Closure
 from avow.assurance.deficits import deficits
@@ -54,7 +54,6 @@ from avow.assurance.model import (
     Derivation,
     DerivationView,
     EvidenceView,
-    Grade,
     ObligationView,
     OpenItem,
     RunInfo,
@@ -132,7 +131,7 @@ def conclude(facts: Facts) -> Case:
     said = Statements(facts.statements, facts.today)
     programs = [v for v in views if v.obligation.kind is Kind.PROGRAM]
     relied = {v.id: r for v in views if (r := relied_upon(v, said.judge, programs))}
-    closure = Closure(views, facts.nodes, rests, standings)
+    closure = Closure(views, facts.nodes, rests, standings, relied)
     closed = {r.id: closure.of_requirement(r.id) for r in facts.requirements}
     whole = closure.of([v.id for v in views if v.obligation.kind in (Kind.GUARANTEE, Kind.PROGRAM)])
     supposed = assumptions(facts, views, relied, closed, whole, said)
@@ -141,6 +140,8 @@ def conclude(facts: Facts) -> Case:
         held(requirement_view(r, names, standings, statuses), closed[r.id], by_id, relied, supposed, titles)
         for r in facts.requirements
     )
+    levels = {name: r.level for r in requirements for name in r.obligations}
+    views = tuple(replace(view, level=levels.get(view.id)) for view in views)
     derived = tuple(_derivation(d, standings, rests, names) for d in facts.derivations)
     fresh, freshness = _fresh(facts, views)
     proofs = proof_views(views, facts.kernel, facts.run.id)

@@ -26,6 +26,20 @@ CALCULUS = "compose"
 _CERTIFIABLE = (Kind.COMPOSITION, Kind.REQUIREMENT)
 
 
+class Grade(StrEnum):
+    """Whether the proofs of composition and requirements are certified."""
+
+    CHECKED = "proofs not certified"
+    """Some such proof has no certificate, or there is none, or the ledger's digests were not verified."""
+    CERTIFIED = "proofs certified"
+    """The kernel re-established every such proof of the calculus in this run, and every digest was verified."""
+
+    @property
+    def word(self) -> str:
+        """The text after the word *proofs*; it is independent of the verdict beside it."""
+        return self.removeprefix("proofs ")
+
+
 class ProofGrade(StrEnum):
     CERTIFIED_2 = "certified-2"
     """Established by the kernel in this run; two solvers, of different makers, answered each of its queries."""

@@ -11,9 +11,10 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from avow.assurance.model import NodeView, ObligationView
 from avow.assurance.naming import requirement_claim
+from avow.assurance.relied import Relied, differs
 from avow.base.records import dataclass
 from avow.evidence.claims import Standing
-from avow.evidence.obligation import Kind
+from avow.evidence.obligation import Kind, ProgramClaim
 
 _TOGETHER = (".persistence", ".one-output")
 
@@ -38,7 +39,10 @@ class Closure:
         nodes: Sequence[NodeView],
         rests: Mapping[str, tuple[str, ...]],
         standings: Mapping[str, Standing],
+        relied: Mapping[str, Relied],
     ) -> None:
+        self.relied = relied
+        self.programs = [view for view in views if view.obligation.kind is Kind.PROGRAM]
         self.standings = standings
         self.views = {view.id: view for view in views}
         self.rests = rests
@@ -97,7 +101,7 @@ class Closure:
         if _guarantees(view):
             node, about = view.obligation.node, f"{view.obligation.node}.{view.obligation.name}"
             assumed = [f"{node}.{clause}" for clause in self.assumptions.get(node, ())]
-            return self._discharged(assumed, list(self.joint.get(about, ())))
+            return self._discharged(assumed, [*self.joint.get(about, ()), *self._differing(view)])
         if view.obligation.kind in (Kind.COMPOSITION, Kind.REQUIREMENT):
             labels = [label for r in view.records for label in used(r.details)]
             found = [self.known[label] for label in labels if label in self.known]
@@ -105,6 +109,12 @@ class Closure:
             assumed = [label for label in labels if label not in self.known and self._is_assumption(label)]
             return self._discharged(assumed, found)
         return (), ()
+
+    def _differing(self, view: ObligationView) -> Iterator[str]:
+        """The refuted claim that a node's program agrees with the model that a guarantee rests on."""
+        relied, o = self.relied.get(view.id), view.obligation
+        if relied is not None and differs(self.programs, o, relied.record):
+            yield self.local[f"{o.node}/{Kind.PROGRAM}/{ProgramClaim.LINKED}"]
 
     def _discharged(self, assumptions: Sequence[str], found: list[str]) -> tuple[tuple[str, ...], tuple[str, ...]]:
         lost = []

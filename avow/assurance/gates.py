@@ -437,15 +437,13 @@ def _suggestion(view: ObligationView) -> tuple[Suggestion, ...]:
 
 def suggestion_for(view: ObligationView, facts: Facts, today: date) -> Suggestion | None:
     """The cheapest step that would close an obligation's gap; None if there is no gap."""
-    lacking: str | None
     if view.obligation.kind is Kind.GUARANTEE:
         demand = facts.policy.demand(view.criticality)
-        lacking = shortfall(view, demand, facts.policy, today)
+        lacking = bool(shortfall(view, demand, facts.policy, today))
     else:
         demand = None
         good = _asked(view.obligation.kind, facts)
-        enough = view.advice or (view.status.supports and (not good or view.status in good))
-        lacking = None if enough else view.status.value
+        lacking = not (view.advice or (view.status.supports and (not good or view.status in good)))
     return suggest(view, demand, facts) if lacking else None
 
 

@@ -14,7 +14,7 @@ from dataclasses import field
 from enum import StrEnum
 
 from avow.assurance.answers import Answers, Assumption, Baseline, Changes, Deficit, Level, Tone, WeakestEvidence
-from avow.assurance.certification import KernelRun, ProofView, Trusted
+from avow.assurance.certification import Grade, KernelRun, ProofView, Trusted
 from avow.assurance.hazards import HazardView
 from avow.assurance.history import History
 from avow.assurance.naming import is_advice
@@ -180,10 +180,17 @@ class ObligationView:
     handled: str = ""
     """``expected`` or ``accepted``, if the plan handles its finding."""
     suggestion: Suggestion | None = None
+    level: Level | None = field(default=None, metadata=codec.LATER)
+    """For a requirement's own obligation: how far the requirement is shown."""
 
     @property
     def id(self) -> str:
         return self.obligation.id
+
+    @property
+    def word(self) -> str:
+        """How it stands, in the term that every format uses."""
+        return self.level or self.standing.value
 
     @property
     def advice(self) -> bool:
@@ -393,20 +400,6 @@ class Gate:
     def mark(self) -> str:
         """The mark shown beside the state."""
         return "–" if self.idle else "✘" if not self.passed else "◐" if self.excused else "✔"
-
-
-class Grade(StrEnum):
-    """Whether the proofs of composition and requirements are certified."""
-
-    CHECKED = "CHECKED"
-    """Some such proof has no certificate, or there is none, or the ledger's digests were not verified."""
-    CERTIFIED = "CERTIFIED"
-    """The kernel re-established every such proof of the calculus in this run, and every digest was verified."""
-
-    @property
-    def word(self) -> str:
-        """The text after the word *proofs*; it is independent of the verdict beside it."""
-        return "certified" if self is Grade.CERTIFIED else "not certified"
 
 
 @dataclass(frozen=True, slots=True)

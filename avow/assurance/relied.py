@@ -1,8 +1,9 @@
 """The record of each guarantee that is relied upon, and what was observed, in words with its bound.
 
-If several records support a claim, one is chosen: first one whose assumptions have not expired, then one that is a
-proof or an exhaustive check, then one of the program itself before one of a model that is no stronger, then one whose
-assumptions all have an owner. A proof of the node's source states assumptions that a proof of a model leaves out.
+If several records support a claim, one is chosen: first one whose assumptions have neither expired nor been refuted,
+then one that is a proof or an exhaustive check, then one of the program itself before one of a model that is no
+stronger, then one whose assumptions all have an owner. A proof of the node's source states assumptions that a proof of
+a model leaves out.
 """
 
 from __future__ import annotations
@@ -73,7 +74,7 @@ def relied_upon(view: ObligationView, opinion: Opinion, views: Iterable[Obligati
         limits = (h for h in record.rests_on if h.kind is HypothesisKind.BOUND and h.name.startswith("scenario."))
         thought = [opinion(record.method, text) for text in open_ones]
         badness = (
-            any(t.expired for t in thought),
+            any(t.expired for t in thought) or differs(views, view.obligation, record),
             status not in EXHAUSTIVE,
             outdone,
             not all(t.owned for t in thought),
@@ -121,6 +122,12 @@ def agrees(views: Iterable[ObligationView], guarantee: Obligation, method: str) 
             same = any(isinstance(c, Mapping) and guarantee.name in c.get(method, ()) for c in compared)
             return view.standing if same or not view.standing.supports else None
     return None
+
+
+def differs(views: Iterable[ObligationView], guarantee: Obligation, record: Evidence) -> bool:
+    """Whether a record is of a model that the node's program is known to differ from."""
+    refuted = (Status.REFUTED, Status.CONTRADICTORY)
+    return record.of is Object.MODEL and agrees(views, guarantee, record.method) in refuted
 
 
 def examined(relied: Relied, link: Status | None = None) -> str:

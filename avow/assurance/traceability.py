@@ -135,7 +135,7 @@ def trace(case: Case) -> tuple[Row, ...]:
 def _rows(view: ObligationView, derivation: str, remark: str = "") -> Iterable[Row]:
     o = view.obligation
     guarantee = short(o.id) if o.kind is Kind.GUARANTEE else ""
-    start = Row(derivation=derivation, guarantee=guarantee, obligation=o.id, status=view.standing.value, remark=remark)
+    start = Row(derivation=derivation, guarantee=guarantee, obligation=o.id, status=view.word, remark=remark)
     if not view.counting:
         missing = "orphan: no evidence"
         yield replace(start, remark=f"{remark}; {missing}" if remark else missing)

@@ -106,7 +106,7 @@ def _suite(case: Case, node: str, views: Iterable[ObligationView]) -> tuple[str,
     rows = []
     counts = [0, 0, 0, 0]
     for view in views:
-        message = f"{view.standing.value}: {headline(view)}"
+        message = f"{view.word}: {headline(view)}"
         text = escape(clean(message))
         inside = ""
         if tone(view.status) == "bad" and not view.handled and not view.advice:
@@ -202,7 +202,7 @@ def _result(view: ObligationView, case: Case, rules: list[str]) -> dict[str, Any
         "ruleIndex": rules.index(_rule(view)),
         "kind": kind,
         "level": level,
-        "message": {"text": f"{short(o.id)} is {view.standing.value}. {o.claim.rstrip('.')}. {headline(view)}"},
+        "message": {"text": f"{short(o.id)} is {view.word}. {o.claim.rstrip('.')}. {headline(view)}"},
         "partialFingerprints": {"avowObligation/v1": sha256(o.id)},
         "properties": {
             "obligation": o.id,

@@ -10,9 +10,9 @@ import pytest
 
 from assurance.sample import RUN, case, evidence, guarantee, node_plan, obligation, system
 from avow.assurance.case import conclude_again
-from avow.assurance.certification import KernelRun, ProofGrade
+from avow.assurance.certification import Grade, KernelRun, ProofGrade
 from avow.assurance.codec import from_json, to_json
-from avow.assurance.model import Case, Grade
+from avow.assurance.model import Case
 from avow.base.verdict import Verdict
 from avow.evidence.audit import Discrepancy, Fault
 from avow.evidence.claims import Reestablished

@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 from assurance.sample import case, evidence, guarantee, node_plan, obligation, system
+from avow.assurance.answers import MODELS, Level
 from avow.assurance.model import Case, Gate
 from avow.base.verdict import Object, Verdict
 from avow.evidence.obligation import Kind, ProgramClaim
@@ -48,6 +49,19 @@ def test_the_program_agrees_with_a_model_that_it_was_compared_with(compared: dic
         assert one == (said if "g" in compared.get(model.method, ()) else "1 proved (model)")
     unknown = evidence(LINKED, Verdict.UNKNOWN, "hypothesis", details={"agrees": compared})
     assert words(unknown, MODEL) == "1 proved (model; program agrees: unknown)"
+
+
+def test_a_model_that_the_program_refutes_shows_nothing() -> None:
+    asked = [Requirement("R", "It is safe.", None, None, ("n.g",))]
+    plans = [node_plan("n", "medium", "hoare", "hypothesis")]
+    whole = system({"n": ["g"]}, plans=plans, requirements=asked, policy={"programs": []})
+    refuted = evidence(LINKED, Verdict.REFUTED, "hypothesis")
+    levels = {Level.ARGUED: [MODEL], Level.NOT_SHOWN: [MODEL, refuted]}
+    for level, records in levels.items():
+        found = case(whole, [G, LINKED], records)
+        assert found.requirements[0].level is level
+        assert any(a.key == MODELS for a in found.assumptions) is (level is not Level.NOT_SHOWN)
+    assert case(whole, [G, LINKED], [MODEL, refuted, TESTED]).requirements[0].level is Level.ARGUED
 
 
 def test_a_test_of_the_source_is_no_proof() -> None:
