@@ -60,12 +60,12 @@ class Demand:
         return ages.get(status.value, ages.get("all"))
 
     def text(self) -> str:
-        """The demand as a phrase: ``proved or checked, by 2 independent methods``."""
+        """The demand as a phrase: ``proved or checked, supported by 2 independent methods``."""
         if not self.one_of:
             return "nothing is asked"
         parts = {
             asked_of(self): True,
-            f"by {self.methods} {'independent ' if self.independent else ''}methods": self.methods > 1,
+            f"supported by {self.methods} {'independent ' if self.independent else ''}methods": self.methods > 1,
             f"tie {' or '.join(self.links)}": self.links,
             f"of a {' or '.join(self.of)}": self.of,
             f"in {' or '.join(self.numbers)} numbers": self.numbers,

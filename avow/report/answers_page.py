@@ -22,7 +22,7 @@ from avow.evidence.status import Status, weigh
 from avow.report import wording
 from avow.report.bowtie import bowtie
 from avow.report.goals import doubts
-from avow.report.modules import NodeModule, RequirementModule, node_modules, requirement_modules
+from avow.report.modules import NodeModule, RequirementModule, conditions, node_modules, requirement_modules
 from avow.report.page import asset, environment, known_pages, svg_image
 
 _ORDER = (Tone.RED, Tone.AMBER, Tone.GREEN, Tone.GREY)
@@ -66,10 +66,12 @@ def render_argument(case: Case, json_digest: str = "") -> str:
         "argument.html.j2",
         case,
         json_digest,
+        conditions=conditions(case),
         doubts=doubts(case),
         full_reason=full_reason,
         kept_apart=kept_apart,
         shade=shade,
+        some=listed,
         where=wording.where,
         modules=[_requirement(case, m) for m in requirement_modules(case)],
         node_modules=[_node(case, m) for m in node_modules(case)],

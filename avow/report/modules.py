@@ -24,7 +24,7 @@ class RequirementModule:
     """The reason for its level, as a sentence."""
     strategy: str
     away: tuple[tuple[str, str, str], ...]
-    """(node, its name for readers, the number of its guarantees that count here with their statuses)."""
+    """(node, its name for readers, the number of its guarantees that count here, each or its counts by status)."""
     conditions: str
     """The number of conditions of the composition that are met here; empty if there are none."""
     supposes: tuple[str, ...]
@@ -41,6 +41,7 @@ class NodeModule:
 def requirement_modules(case: Case) -> tuple[RequirementModule, ...]:
     views = {view.id: view for view in case.obligations}
     numbers = {s.key: s.number for s in case.assumptions}
+    total = Counter(view.obligation.node for view in case.guarantees)
     found = []
     for r in case.requirements:
         under = [views[name] for name in r.closure if name in views]
@@ -48,7 +49,8 @@ def requirement_modules(case: Case) -> tuple[RequirementModule, ...]:
         for node in case.nodes:
             own = [v for v in under if v.obligation.kind is Kind.GUARANTEE and v.obligation.node == node.name]
             if own:
-                away.append((node.name, node.title, f"{len(own)} of its guarantees: {_standings(own)}"))
+                of = f"{len(own)} of {count(total[node.name], 'guarantee')}"
+                away.append((node.name, node.title, f"{of}: {_standings(own)}"))
         side = [v for v in under if v.obligation.kind is Kind.COMPOSITION]
         assumed = sum(v.status is Status.JUSTIFIED for v in side)
         shown = sum(v.standing.supports for v in side) - assumed
@@ -69,7 +71,19 @@ def node_modules(case: Case) -> tuple[NodeModule, ...]:
 
 
 def _standings(views: Sequence[ObligationView]) -> str:
+    if len(views) <= 3:
+        return ", ".join(f"{view.obligation.name} {view.standing}" for view in views)
     return ", ".join(f"{many} {said}" for said, many in Counter(view.standing for view in views).items())
+
+
+def conditions(case: Case) -> list[tuple[ObligationView, list[str]]]:
+    """The conditions of the composition, each with the requirements that rest on it."""
+    needing: dict[str, list[str]] = {}
+    for r in case.requirements:
+        for name in r.closure:
+            needing.setdefault(name, []).append(r.id)
+    composition = (view for view in case.obligations if view.obligation.kind is Kind.COMPOSITION)
+    return [(view, needing[view.id]) for view in composition if view.id in needing]
 
 
 def _because(case: Case, r: RequirementView) -> str:

@@ -234,6 +234,9 @@ def test_without_owner_or_date_an_assumption_weakens() -> None:
     assert NO_WORDS in [s.words for s in found.assumptions]
     unowned = {w.key: w.claims for w in found.deficits}["unowned"]
     assert set(unowned) == {s.key for s in found.assumptions if not s.owned}
+    shown = replace(found.requirements[0], level=Level.SHOWN, tone=Tone.AMBER, bounded=False, rate=None, searched="")
+    assert shown.noted == "an assumption has no owner or end"
+    assert replace(shown, tone=Tone.GREEN).noted == ""
 
 
 def test_an_assumption_stands_once_whoever_needs_it() -> None:

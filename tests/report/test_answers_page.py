@@ -15,6 +15,7 @@ from avow.assurance.answers import Failure, Level
 from avow.assurance.codec import read_case
 from avow.assurance.model import Case
 from avow.base.verdict import Verdict
+from avow.evidence.obligation import Kind
 from avow.report.answers_page import render_answers, render_argument, worded
 from avow.report.markdown import render_markdown
 from avow.report.pdf import _data as pdf_data
@@ -103,6 +104,17 @@ def test_each_gate_that_fails_is_in_the_banner_and_each_hazard_on_the_first_scre
     every = replace(found.requirements[1], level=Level.SHOWN, rests_on=(target.id,))
     assert "counts as resting on all" in render_argument(replace(found, requirements=(every,)))
     assert "Entailment by the composed contracts" in render_argument(found)
+
+
+def test_each_condition_of_the_composition_stands_once_with_the_requirements_that_need_it() -> None:
+    found = rover_case()
+    page = " ".join(re.sub(r"<[^>]*>", " ", render_argument(found)).split())
+    table = page.partition("needed by ")[2].partition("Assumptions, each once")[0]
+    for view in found.obligations:
+        needing = [r.id for r in found.requirements if view.id in r.closure]
+        if view.obligation.kind is Kind.COMPOSITION and needing:
+            assert table.count(f": {view.obligation.claim} ") == 1
+    assert "1 of 1 guarantee: one_position stale" in page
 
 
 @pytest.mark.parametrize("name", CASES)
