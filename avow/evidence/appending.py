@@ -32,6 +32,14 @@ def open_file(path: str, flags: int) -> int:
     return file
 
 
+def drop_half_line(file: int) -> None:
+    """Remove what a killed run left behind the last end of a line, so that the chain continues after that line."""
+    end = os.fstat(file).st_size
+    while end and os.pread(file, 1, end - 1) != b"\n":
+        end -= 1
+    os.ftruncate(file, end)
+
+
 def append(file: int, data: bytes) -> None:
     """Append `data`. Raises OSError: then nothing was added."""
     size = os.fstat(file).st_size

@@ -77,7 +77,7 @@ def audit(
     entries = ledger.records()
     found = [Discrepancy(Fault.LEDGER, f"line {d.line}", f"ledger line {d.line} {d.reason}") for d in ledger.damage]
     if ledger.torn:
-        text = "the last line is half written: a run was killed; the next one will put it aside"
+        text = "the last line is half written: a run was killed; the next one removes it"
         found.append(Discrepancy(Fault.LEDGER, "the end", text, serious=False))
     found += _redirected(ledger)
     found += _misplaced(entries, system, obligations or {}, keys or {})

@@ -20,7 +20,6 @@ from __future__ import annotations
 
 import base64
 import json
-import os
 from collections.abc import Iterable
 from dataclasses import field, replace
 from datetime import UTC, datetime
@@ -30,7 +29,7 @@ from pathlib import Path
 from avow.base.codec import LATER, Unreadable, canonical, from_text, to_json
 from avow.base.files import read_regular, sha256
 from avow.base.records import dataclass
-from avow.evidence.appending import append, locked
+from avow.evidence.appending import append, drop_half_line, locked
 
 GENESIS = "0" * 64
 """The hash before the first record of a chain."""
@@ -130,10 +129,8 @@ def note(path: Path, event: Event, system: str, records: int = 0, head: str = GE
     if event is not Event.BEGAN and _is_newest(read_index(path), event, system, records, head):
         return
     with locked(path) as file:
-        data = read_regular(path)
-        whole = data[: data.rfind(b"\n") + 1]
-        os.ftruncate(file, len(whole))  # removes what a killed run left half written
-        lines = whole.splitlines()
+        drop_half_line(file)
+        lines = read_regular(path).splitlines()
         last = _read(lines[-1]) if lines else None
         now = datetime.now(UTC).isoformat(timespec="seconds")
         follows = last.hash if last else GENESIS

@@ -4,7 +4,7 @@ full.
     {"evidence": {…}, "hash": "…", "n": 7, "prev": "…"}        hash = SHA-256 of the line without its hash
 
 - A record is written whole under a lock and synced before `append` returns. A killed run leaves at most one torn last
-  line; the next append moves those bytes to ``<file>.torn``, goes on, and reports it in `Ledger.repaired`.
+  line; the next append removes those bytes and goes on.
 - A line in the middle that cannot be read, does not match its hash or does not follow its predecessor is *damage*: it
   is never used as evidence, and always reported (`Ledger.damage`, `avow audit`, a gate).
 - ``<file>.head`` names the newest record, so that cutting whole lines off the end is noticed too; the ``index`` of the
@@ -33,7 +33,7 @@ from avow.base.files import identity, read_regular, sha256, write
 from avow.base.notes import read_note, write_note
 from avow.base.records import dataclass
 from avow.base.verdict import Verdict
-from avow.evidence.appending import append, locked, open_file
+from avow.evidence.appending import append, drop_half_line, locked, open_file
 from avow.evidence.heads import GENESIS as GENESIS
 from avow.evidence.heads import Event, Head, index_path, note
 from avow.evidence.record import CASE, Evidence
@@ -83,8 +83,6 @@ class Ledger:
         """`remembers`: lines that a note records as read without damage are not checked again."""
         self.path = path
         self._remembers = remembers
-        self.repaired: tuple[str, ...] = ()
-        """The repairs of torn lines, in sentences."""
         self._lock = threading.RLock()
         self._held = 0
         self._forget()
@@ -106,7 +104,7 @@ class Ledger:
 
     @property
     def torn(self) -> bool:
-        """Whether the last line is half written: a run was killed, and the next one will move the line aside."""
+        """Whether the last line is half written: a run was killed, and the next one removes it."""
         with self._lock:
             self._refresh()
             return bool(self._tail) and not self._garbage()
@@ -167,7 +165,7 @@ class Ledger:
         """Add records under one lock with one sync. Raises OSError: then none of them was added."""
         with self._lock, locked(self.path) as file:
             assert not self._held, "nothing is written while the ledger is to stand still"
-            self._mend(file)
+            drop_half_line(file)
             self._refresh()
             cut = self._lines > 0 and bool(self._cut_off())
             added, lines, result = dict[bytes, Entry](), [], []
@@ -199,7 +197,7 @@ class Ledger:
         """Accept the newest record that is there as the end: no later one is missing. Raises OSError."""
         with self._lock, locked(self.path) as file:
             assert not self._held, "nothing is written while the ledger is to stand still"
-            self._mend(file)
+            drop_half_line(file)
             self._refresh()
             self._write_head(Head(self._stated_head, self._lines))
 
@@ -236,24 +234,6 @@ class Ledger:
         note = read_note(_Known, self._note) if self._remembers and not self._offset else None
         known = note is not None and note.bytes <= len(data) and sha256(data[: note.bytes]) == note.sha256
         return note.bytes if note is not None and known else 0
-
-    def _mend(self, file: int) -> None:
-        """Move a torn last line (a run was killed while writing it) aside, so that the chain continues after the line
-        before it."""
-        size = os.fstat(file).st_size
-        if size == 0 or os.pread(file, 1, size - 1) == b"\n":
-            return
-        start, step = size, 65536
-        tail = b""
-        while start > 0 and b"\n" not in tail:
-            begin = max(0, start - step)
-            tail = os.pread(file, start - begin, begin) + tail
-            start = begin
-        torn = tail.rpartition(b"\n")[2]
-        with locked(self.path.with_name(self.path.name + ".torn")) as aside:
-            append(aside, torn + b"\n")
-        os.ftruncate(file, size - len(torn))
-        self.repaired += (f"a torn last line of {len(torn)} bytes was put aside in {self.path.name}.torn",)
 
     def _refresh(self) -> None:
         """Read what was added since the last look (by this or another process)."""

@@ -3,20 +3,16 @@
 from __future__ import annotations
 
 import json
-import os
-import time
 from collections.abc import Iterable, Mapping
-from dataclasses import field, replace
+from dataclasses import replace
 from pathlib import Path
 
 from avow.backend_kit import one_step
-from avow.base.codec import LATER
 from avow.base.diagnostics import Diagnostic, Rejected
-from avow.base.files import digest_file, identity, is_intact, sha256, write
+from avow.base.files import digest_file, is_intact, sha256, write
 from avow.base.notes import read_note, write_note
 from avow.base.records import dataclass
 from avow.base.remembered import by_identity
-from avow.base.tuning.running import SETTLED_NS
 from avow.base.workspace import Workspace
 from avow.language.contract import Node
 from avow.pipeline.blobs import encode
@@ -29,11 +25,10 @@ STAMP = ".export.json"
 
 @dataclass(frozen=True, slots=True)
 class Stamp:
-    """What the files were generated from, their digests, and their identities when they were last read."""
+    """What the files were generated from, and their digests."""
 
     key: str
     files: Mapping[str, str]
-    seen: str = field(default="", metadata=LATER)
 
 
 def folder(workspace: Workspace, work: Work) -> Path:
@@ -44,29 +39,7 @@ def is_current(workspace: Workspace, work: Work, key: str) -> bool:
     """Whether the files on disk are what this key generated: an edited or missing artifact is not."""
     place = folder(workspace, work)
     stamp = read_stamp(place)
-    if stamp is None or stamp.key != key:
-        return False
-    files = stamp.files
-    try:
-        seen, settled = _marks(place, files)
-        if stamp.seen == seen:
-            return True
-        if not all(is_intact(place / name, sha) for name, sha in files.items()):
-            return False
-        if settled and _marks(place, files) == (seen, True):
-            write_note(place / STAMP, Stamp(key, files, seen))
-    except OSError:  # the file is gone; without a writable folder, files are read every time
-        return all(is_intact(place / name, sha) for name, sha in files.items())
-    return True
-
-
-def _marks(place: Path, files: Iterable[str]) -> tuple[str, bool]:
-    """A digest of what the shortcut uses as a file's identity, and whether all of them are older than the clock's tick:
-    an edit within the tick may leave the times unchanged. Raises OSError."""
-    paths = [f"{place}/{name}" for name in files]
-    marks = [identity(os.stat(path), path) for path in paths]  # noqa: PTH116 - of each artifact in every run
-    newest = max((int(mark[-1]) for mark in marks), default=0)
-    return sha256(json.dumps(marks)), time.time_ns() - newest > SETTLED_NS
+    return stamp is not None and stamp.key == key and all(is_intact(place / n, sha) for n, sha in stamp.files.items())
 
 
 @by_identity(20_000)
