@@ -126,12 +126,11 @@ def _run(job: Job, place: Path, limits: Limits) -> tuple[Completed | None, Answe
     """The result of Avow's run of the generated test, if it completed."""
     (place / QUESTION).write_bytes(pickle.dumps(_question(job)))
     (place / "run.py").write_text("from avow.backends.hypothesis.running import main\n\nmain()\n", encoding="utf-8")
-    seconds = max(1.0, limits.seconds * 0.8)
     try:
         return judge.ask(
             Answer,
             "run.py",
-            [str(seconds), str(limits.seed)],
+            [str(max(1.0, limits.seconds * 0.8)), str(limits.seed)],
             cwd=place,
             seconds=limits.seconds,
             megabytes=limits.megabytes,

@@ -264,8 +264,7 @@ class _Work:
             judged = self.judged(events, run)
             shown = self.wrong(name, run, judged)
             if shown is not None:
-                last = judged.clauses[name].at or None
-                shown = replace(shown, trace=tuple(self.told(events, run))[:last])
+                shown = replace(shown, trace=tuple(self.told(events, run))[: (judged.clauses[name].at or None)])
                 case: dict[str, object] = {CASE: [[e.topic, e.at, e.data] for e in events]}
                 return Outcome(obligation.id, Verdict.REFUTED, shown.text(), shown, bound=self.bound(), details=case)
         return Outcome(obligation.id, Verdict.UNKNOWN, UNSTEADY, bound=self.bound())
@@ -335,8 +334,7 @@ class _Work:
         if count.undecided:
             why = f"{count.undecided} judgements are undecided: {count.reason or 'no calculation tells'}"
         elif not count.held:
-            if not count.reason and not count.excused:
-                outcome = replace(outcome, verdict=Verdict.ERROR)
+            outcome = replace(outcome, verdict=Verdict.UNKNOWN if count.reason or count.excused else Verdict.ERROR)
             why = "no publication was judged: " + (count.reason or "the class never published all that it speaks of")
             why = f"{count.excused} times only with an assumption broken" if count.excused else why
         else:

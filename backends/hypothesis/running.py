@@ -77,8 +77,7 @@ def main() -> None:
     channel, seconds, start = int(sys.argv[1]), float(sys.argv[2]), int(sys.argv[3])
     os.set_inheritable(channel, False)
     adopt_orphans()
-    asked = pickle.loads(Path(QUESTION).read_bytes())
-    judge.say(channel, Bench(asked, seconds, start).answer())
+    judge.say(channel, Bench(pickle.loads(Path(QUESTION).read_bytes()), seconds, start).answer())
 
 
 class Bench:
@@ -96,8 +95,7 @@ class Bench:
         self.guarantees = {c.name: guarantee(c.name, c.formula, records) for c in asked.guarantees}
         self.keeper = Keeper(records.cells)
         self.runs_counted = bool(records.cells)
-        patience = min(SUBJECT_PATIENCE, max(1.0, seconds / 4))
-        self.unit = Unit(asked, patience)
+        self.unit = Unit(asked, min(SUBJECT_PATIENCE, max(1.0, seconds / 4)))
         self.valid = self.rejected = self.undecided = self.replayed = self.runs = 0
         self.traces: dict[str, Trace] = {}
         """Guarantee → a run up to the step that violates it; for a function, its one step."""
@@ -159,8 +157,7 @@ class Bench:
             if self.found is None:
                 reject()
 
-        strategies = test.hypothesis._given_kwargs
-        seed(self.seed)(chosen(given(**strategies)(one)))()
+        seed(self.seed)(chosen(given(**test.hypothesis._given_kwargs)(one)))()
 
     def begin(self) -> None:
         """A run begins."""

@@ -107,8 +107,7 @@ def _constants(program: Iterable[Path]) -> Iterator[Fraction | str]:
             alone = [part.value for part in ast.walk(tree) if isinstance(part, ast.Expr)]
             documentation = {part.value for part in alone if isinstance(part, ast.Constant)}
             written = [part.value for part in ast.walk(tree) if isinstance(part, ast.Constant)]
-            named = _Named(tree).visit(tree)
-            calculated = [*worked_out(compile(named, "", "exec", dont_inherit=True))]
+            calculated = [*worked_out(compile(_Named(tree).visit(tree), "", "exec", dont_inherit=True))]
         except (SyntaxError, ValueError, RecursionError, MemoryError):
             continue
         for value in (*written, *calculated, *_beside(path, written)):

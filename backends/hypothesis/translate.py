@@ -255,8 +255,7 @@ class Translator:
             every = (
                 f"all({scope.formula(demanded)} {loops.filtered(scope)})" if loops.text else scope._at(demanded, _AND)
             )
-            denied = [scope._at(negation(item), _AND) for item in loops.before]
-            found.append(" or ".join([*denied, every]))
+            found.append(" or ".join([*[scope._at(negation(item), _AND) for item in loops.before], every]))
         return " and ".join(f"({text})" if len(found) > 1 else text for text in found)
 
     def _loops(self, variables: Sequence[t.Variable], items: Sequence[t.Term]) -> _Loops:
@@ -383,8 +382,7 @@ def _bound(item: t.Term, unbound: Sequence[t.Variable], *, above: bool) -> tuple
     """The whole number that a comparison bounds from above (or below), the bound, and whether it is strict."""
     if not isinstance(item, t.Compare) or item.operator not in ("<", "<=", ">", ">="):
         return None
-    less = item.operator in ("<", "<=")
-    small, large = (item.left, item.right) if less else (item.right, item.left)
+    small, large = (item.left, item.right) if (item.operator in ("<", "<=")) else (item.right, item.left)
     one, other = (small, large) if above else (large, small)
     if not isinstance(one, t.Variable) or one not in unbound or isinstance(one.sort, RealSort):
         return None
@@ -411,10 +409,9 @@ def _alternatives(term: t.Term, positive: bool) -> list[Branch]:
         case t.Implies(left=left, right=right):
             return _alternatives(t.Or((negation(left), right)), positive)
         case t.Iff(left=left, right=right):
-            pairs = ((True, positive), (False, not positive))
             return [
                 _together(chosen)
-                for one, other in pairs
+                for one, other in ((True, positive), (False, not positive))
                 for chosen in product(_branches(left, one), _branches(right, other))
             ]
         case t.Quantified(quantifier=t.Quantifier.EXISTS, variables=variables, body=body) if positive:
