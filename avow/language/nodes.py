@@ -183,9 +183,8 @@ def _goes_with(topic: Topic, earlier: Sequence[Topic], name: Token, reports: Rep
     other = other or (earlier[0] if earlier and topic.port is None else None)
     if other is None:
         return True
-    message = f"the topic `{topic.name}` is listed twice" + (
-        " with two types" if other.ros_type != topic.ros_type else ""
-    )
+    types = f", as {other.ros_type} and as {topic.ros_type}" if other.ros_type != topic.ros_type else ""
+    message = f"the topic `{topic.name}` is listed twice{types}"
     hint = "a topic has one type, and is listed once, or once for each variable with `matches(…)`"
     notes = ((f"`{topic.name}` is first listed here", other.span),)
     reports.error("RCL216", message, name.start, name.end, hint=hint, notes=notes)

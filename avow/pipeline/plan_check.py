@@ -65,7 +65,7 @@ def of_plan(
                 found += said
                 if clean is not None and not said:
                     clean.add(name)
-    return tuple(d for d in found if d.is_error or d.code not in system.plan.lints_off)
+    return tuple(d for d in dict.fromkeys(found) if d.is_error or d.code not in system.plan.lints_off)
 
 
 def left_out(system: System) -> tuple[Diagnostic, ...]:

@@ -21,7 +21,8 @@ class WrongParameters(Exception):  # noqa: N818 - it is what was found wrong
 
 def is_sectioned(data: object) -> bool:
     """Whether it is a parameter file of ROS 2, not a plain mapping."""
-    return isinstance(data, Mapping) and (SECTION in data or SLIP in data or any(map(is_sectioned, data.values())))
+    keys = data.items() if isinstance(data, Mapping) else ()
+    return any(key in (SECTION, SLIP) or str(key)[:1] == "/" or is_sectioned(value) for key, value in keys)
 
 
 def of_node(data: Mapping[str, Any], name: str) -> dict[str, Any]:
@@ -76,7 +77,9 @@ def _entries(data: Mapping[str, Any], before: str) -> Iterator[tuple[str, Mappin
         if key == SLIP:
             raise WrongParameters(f"{before or '/'} has `{SLIP}`: write `{SECTION}`, with two underscores")
         if not isinstance(value, Mapping):
-            raise WrongParameters(f"{name} is neither a node with `{SECTION}` nor a namespace")
+            raise WrongParameters(
+                f"{name} is neither a node with `{SECTION}` nor a namespace: write `ros__parameters:` above it"
+            )
         if SECTION not in value:
             yield from _entries(value, name)
         elif len(value) > 1:

@@ -84,8 +84,11 @@ def every_fault(folder: Path, found: Iterable[Diagnostic]) -> tuple[Diagnostic, 
 
 
 def in_order(found: Iterable[Diagnostic]) -> tuple[Diagnostic, ...]:
-    """Each fault once, file by file from top to bottom."""
-    once = {(d.code, d.span.line if d.span else 0, d.message): d for d in found}
+    """Each fault once, file by file from top to bottom; a file that is not there once."""
+    told = list(found)
+    absent = {name for d in told if d.code == "PLAN107" for name in _QUOTED.findall(d.message)[:1]}
+    told = [d for d in told if d.code == "PLAN107" or absent.isdisjoint(re.findall("['`]([^'`]+)['`]", d.message))]
+    once = {(d.code, d.span.line if d.span else 0, d.message): d for d in told}
     return tuple(
         sorted(once.values(), key=lambda d: (d.span.file, d.span.line, d.span.column) if d.span else ("", 0, 0))
     )

@@ -287,8 +287,7 @@ def _by_names(
 
 def _beside(edge: Edge, other: Endpoint, port: Port) -> Diagnostic:
     message = f"{edge.target} has several providers: {edge.source} by its topic, and {other}, without a topic, by name"
-    hint = f"give {other} its topic in the contract, or another name"
-    return Diagnostic("PLAN122", message, port.span, hint=hint)
+    return Diagnostic("PLAN122", message, port.span, hint=f"give {other} its topic in the contract, or another name")
 
 
 def _several(target: Endpoint, names: list[str], port: Port) -> Diagnostic:

@@ -15,7 +15,7 @@ import yaml
 
 from avow.base.diagnostics import Diagnostic, Severity, Span
 from avow.base.files import inside, read_regular
-from avow.base.suggestions import nearby, suggest
+from avow.base.suggestions import nearby, nearest, suggest
 from avow.base.workspace import find_workspace
 from avow.language.contract import Contract, Node
 from avow.ros.launch import Launched, Setting, Started, read_launch
@@ -84,19 +84,20 @@ def _parameters(plan: Plan, node: Node, launched: Started) -> Iterator[Diagnosti
         return  # reported where the class is examined
     here = dict(flat(mine))
     there, unread = _started_with(launched)
+    place = source.place.at("source", "parameters")
+    alone = sorted(here.keys() - there.keys()) if there and not unread else []
     for name, (value, span) in there.items():
         if here.get(name) != value or isinstance(here[name], bool) is not isinstance(value, bool):
             said = f"the plan says {here[name]!r}" if name in here else "the plan does not set it"
             message = f"{node.name} is started with {name} = {value!r}, and {said}"
+            meant = nearest(name, alone) if name not in here else []
+            alone = [other for other in alone if other not in meant]
             hint = "write what the robot is started with into the file that the plan names:  source: {parameters: …}"
-            yield Diagnostic(
-                "ROS127", message, source.place.at("source", "parameters"), hint=hint, notes=((_at(span), span),)
-            )
-    for name in sorted(here.keys() - there.keys()) if there and not unread else ():
+            hint = f"the plan has `{meant[0]}`: correct the one that is wrong" if meant else hint
+            yield Diagnostic("ROS127", message, place, hint=hint, notes=((_at(span), span),))
+    for name in alone:
         message = f"the plan sets {name} of {node.name}, and {_at(launched.span)} starts it without"
-        yield Diagnostic(
-            "ROS127", message, source.place.at("source", "parameters"), hint="leave it out, or launch with it"
-        )
+        yield Diagnostic("ROS127", message, place, hint="leave it out, or launch with it")
 
 
 def _started_with(launched: Started) -> tuple[dict[str, tuple[Any, Span]], tuple[Diagnostic, ...]]:

@@ -207,8 +207,7 @@ def _unusable(where: str, texts: tuple[str, ...], sort: s.Sort, contract: Contra
     for text in list(dict.fromkeys(texts))[:VALUES_LOOKED_AT]:
         reason = _wrong(text, sort, contract)
         if reason is not None:
-            message = f"{where}: {text!r} is no value of {show_type(sort)}: {reason}"
-            yield Diagnostic("PLAN109", message, span)
+            yield Diagnostic("PLAN109", f"{where}: {text!r} is no value of {show_type(sort)}: {reason}", span)
             return
 
 

@@ -76,8 +76,7 @@ def account(system: System, dataflow: Graph) -> Account | None:
     compound = {name: [m] if isinstance(m, str) else list(m) for name, m in dict(model.get("compound", {})).items()}
     known = {node.name for node in system.contract.nodes if not node.relay}
     at = system.plan.model.at
-    names = system.plan.ros.names
-    called = {names.placed(name).name.lstrip("/"): name for name in known}
+    called = {system.plan.ros.names.placed(name).name.lstrip("/"): name for name in known}
     home: dict[str, str] = {node: called.get(node, node) for node in graph.nodes if node in called or node in known}
     findings: list[Diagnostic] = []
     for name, members in compound.items():

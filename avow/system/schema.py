@@ -52,8 +52,7 @@ def _wrong_places(root: Piece) -> Iterator[tuple[str | int, ...]]:
             yield (*path, str(error.instance))
         elif error.validator == "additionalProperties":
             known = error.schema.get("properties", {})
-            piece = root.at(*path) or root
-            yield from ((*path, key) for key in piece.entries or {} if key not in known)
+            yield from ((*path, key) for key in (root.at(*path) or root).entries or {} if key not in known)
         else:
             yield path
 

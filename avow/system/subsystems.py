@@ -87,8 +87,7 @@ def resolved(plan: Plan, contract: Contract) -> tuple[Plan, tuple[Diagnostic, ..
     inside = leaves(plan)
     faults: list[Diagnostic] = []
     found: list[Edge] = []
-    outside = [*(c for c in plan.connections if c.target.node not in inside)]
-    taken = {connection.target for connection in outside}
+    taken = {connection.target for connection in [*(c for c in plan.connections if c.target.node not in inside)]}
     for connection in plan.connections:
         sources = _sources(connection, inside, contract, faults)
         targets = _targets(connection, inside, contract, taken, faults)

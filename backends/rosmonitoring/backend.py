@@ -41,7 +41,7 @@ class RosMonitoringBackend(Backend):
 
     name = "rosmonitoring"
     title = "runtime monitors, and recorded traces judged by them"
-    version = "14"
+    version = "15"
     strength = Verdict.MONITORED
     link = Link.MAPPED
     of = Object.RECORDING
@@ -92,7 +92,7 @@ class RosMonitoringBackend(Backend):
                 continue
             spoken = {v.qualified for v in free_variables(clause.formula)}
             hidden = next((reason for name, reason in found.hidden.items() if name in spoken), "")
-            if reason := unmonitored(found, clause) or (found.unmarked(spoken) if bags else ""):
+            if reason := unmonitored(found, clause) or found.unmarked(spoken, bags):
                 message = f"{clause.name} cannot be monitored: {reason}"
                 problems.append(Diagnostic("MON103", message, clause.span, Severity.WARNING))
             elif hidden:

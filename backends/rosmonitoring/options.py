@@ -97,12 +97,15 @@ class Setup:
         """The types of the topics that are listened to (without their leading slash), as far as they are known."""
         return {same_topic(rule.topic): rule.kind for rule in self.carried.values() if rule.kind}
 
-    def unmarked(self, names: Collection[str]) -> str:
-        """Why the inputs and outputs among these variables cannot be paired by a field; empty if they can."""
+    def unmarked(self, names: Collection[str], typed: bool) -> str:
+        """Why the inputs and outputs among these variables cannot be paired; empty if they can, as far as is known.
+        `typed`: messages have the fields of their types only."""
         answers, carried = self.answers, {name: rule for name, rule in self.carried.items() if name in names}
-        if answers is None or not set() < carried.keys() & self.heard < carried.keys():
+        if not set() < carried.keys() & self.heard < carried.keys():
             return ""
-        for name, rule in carried.items():
+        if answers is None:
+            return "the plan does not say which input an answer answered: add `answers` to the method"
+        for name, rule in carried.items() if typed else ():
             way = answers.input if name in self.heard else answers.output
             message = self.known.get(rule.kind)
             try:

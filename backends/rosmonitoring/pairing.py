@@ -386,7 +386,7 @@ class Pairing:
             return f"no message of {name} came"
         alike = known.by_key.get(asked.key)
         if not alike:
-            return f"no message of {name} has the answer's {self.answers.by}: pair them in another way (`answers`)"
+            return f"no message of {name} has the answer's {self.answers.by}: it was lost, or `answers` pairs wrongly"
         if name in self.answers.looped and any(one.time > asked.time for one in alike):
             return AFTER
         if len(alike) == 1:

@@ -266,14 +266,11 @@ def suits(sort: Sort, wire: Wire, holder: Message, known: Definitions, values: M
 
 def words(sort: EnumSort, wire: Scalar, holder: Message, values: Mapping[str, str]) -> dict[str, str]:
     """The meaning of a message's words or numbers: by the plan's `values` (which may name constants of the definition),
-    otherwise by the definition's constants whose names are the elements', ignoring case."""
+    otherwise, each, by the definition's constant whose name is an element's, ignoring case."""
     constants = {name: text for name, kind, text in holder.constants if kind == wire.name}
-    if values:
-        return {constants.get(key, key): meant for key, meant in values.items()}
-    if wire.name not in INTEGERS:
-        return {}
-    members = {member.lower(): member for member in sort.members}
-    return {text: members[name.lower()] for name, text in constants.items() if name.lower() in members}
+    members = {member.lower(): member for member in sort.members if wire.name in INTEGERS}
+    own = {text: members[name.lower()] for name, text in constants.items() if name.lower() in members}
+    return own | {constants.get(key, key): meant for key, meant in values.items()}
 
 
 def _places(message: Message, known: Definitions) -> list[tuple[FieldPath, Wire, Message]]:

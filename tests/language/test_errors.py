@@ -277,8 +277,8 @@ def test_several_variables_on_one_topic() -> None:
 @pytest.mark.parametrize(
     ("topics", "message"),
     [
-        ("p/T t matches(in.a), p/U t matches(in.b)", "RCL216 the topic `t` is listed twice with two types"),
-        ("p/T t matches(in.a), p/srv/T t matches(in.b)", "RCL216 the topic `t` is listed twice with two types"),
+        ("p/T t matches(in.a), p/U t matches(in.b)", "RCL216 the topic `t` is listed twice, as p/T and as p/U"),
+        ("p/T t matches(in.a), p/srv/T t matches(in.b)", "RCL216 the topic `t` is listed twice, as p/T and as p/srv/T"),
         ("p/T t matches(in.a), p/T t matches(in.a)", "RCL216 the topic `t` is listed twice"),
         ("p/T t matches(in.a), p/T t", "RCL216 the topic `t` is listed twice"),
         ("p/T t, p/T t", "RCL216 the topic `t` is listed twice"),

@@ -209,6 +209,9 @@ def test_a_message_without_the_field_that_pairs_answers_is_told(
         system = make_system(text, fields, plan=more, traces=traces, answers={"by": "stamp"})
         found = [d for d in BACKEND.check(job_for(system, "n")) if d.code == "MON103"]
         assert ["std_msgs/Float64 has no field 'header'" in d.message for d in found] == [True] * said
+    system = make_system(text, fields, plan=more, traces=traces, answers=None)
+    found = [d for d in BACKEND.check(job_for(system, "n")) if "add `answers` to the method" in d.message]
+    assert len(found) == 1
 
 
 MONITOR = """

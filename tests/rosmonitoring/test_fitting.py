@@ -140,6 +140,13 @@ def test_wrong_paths_and_types_are_faults_of_the_plan(
             {"level": 3},
             Element("ok"),
         ),
+        (
+            "Level",
+            {"field": "level", "values": {"FINE": "ok"}},  # ERROR has the element's own name
+            "uint8 FINE=3\nuint8 ERROR=2\nuint8 level",
+            {"level": 2},
+            Element("error"),
+        ),
         ("REAL", None, "time t", {"t": {"secs": 1, "nsecs": 500_000_000}}, Fraction(3, 2)),
         ("REAL", None, "duration t", {"t": {"sec": -1, "nanosec": 1}}, Fraction(-999_999_999, 10**9)),
         ("Two", None, "float64[2] p", {"p": [1, 2]}, (1, 2)),

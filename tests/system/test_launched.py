@@ -223,6 +223,7 @@ NODE = "<node name='b' pkg='p' exec='b'>{}</node>"
         ("/left/b: {ros__parameters: {limit: 3.0}}", NODE.format("<param name='limit' value='2.0'/>"), "sets nothing"),
         ("{}", NODE.format("<param name='limit' value='2.0'/>"), "limit = 2.0, and the plan does not set it"),
         ("{limit: 2.0, x: 1}", NODE.format("<param name='limit' value='2.0'/>"), "the plan sets x of b"),
+        ("{limitt: 2.0}", NODE.format("<param name='limit' value='2.0'/>"), "(the plan has `limitt`: correct the one"),
         ("{limit: 2.0, x: 1}", NODE.format("<param name='limit' value='$(env L)'/>"), "not read"),
         ("limit: 2.0", "Node(name='b', package='p', executable='b', parameters=[{'limit': 3.0}])", "limit = 3.0"),
         ("limit: 3.0", "Node(name='b', package='p', executable='b', parameters=[HERE, {'limit': 3.0}])", ""),
@@ -259,7 +260,7 @@ def test_parameters_of_a_launch_file_are_compared(tmp_path: Path, own: str, laun
     with pytest.raises(Rejected) as caught:
         load_system(folder)
     assert [d.code for d in caught.value.diagnostics] == ["ROS127"]
-    assert said in caught.value.diagnostics[0].message
+    assert said in "{0.message} ({0.hint})".format(*caught.value.diagnostics)
 
 
 def test_a_contract_drafted_of_what_runs_has_the_names_after_remapping(tmp_path: Path) -> None:

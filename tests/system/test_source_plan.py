@@ -6,8 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from avow.base.diagnostics import Rejected
+from avow.base.diagnostics import Diagnostic, Rejected
 from avow.system import node_plan
+from avow.system.faults import in_order
 from avow.system.load import load_system
 from avow.system.node_plan import never_read, parameters
 from avow.system.plan import Numbers, Source
@@ -39,8 +40,10 @@ def test_every_fault_in_one_round(tmp_path: Path) -> None:
             "    source: {python: nothing.py, class: Watchdog, parameters: ../p.yaml}\n"
             "    memory: {lost: self.a, f: self.b, last: self.b}\n",
         )
+    absent = Diagnostic("HYPO101", "there is no file `nothing.py` in the system's folder")  # as a method finds it
     told = {(d.code, d.span.line if d.span else 0) for d in caught.value.diagnostics}
     assert {("PLAN107", 3), ("PLAN108", 3), ("PLAN106", 4), ("PLAN110", 4)} <= told
+    assert [d.code for d in in_order([*caught.value.diagnostics, absent]) if "nothing.py" in d.message] == ["PLAN107"]
     text = " ".join(d.message for d in caught.value.diagnostics)
     assert "self.b stands there twice" in text
     assert "'lost' is no input of watchdog" in text

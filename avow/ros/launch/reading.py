@@ -317,8 +317,7 @@ class _Reading:
             self.tell(element, "the node has no name here: it has the one that its program gives it")
         elif not scope.lost:
             try:
-                said = self.name(text, scope).lstrip("/")
-                whole = _within(scope.namespace, said)
+                whole = _within(scope.namespace, self.name(text, scope).lstrip("/"))
             except _Unknown as why:
                 self.tell(element, f"the node's name is not known: {why}")
         parts = [self.shown(element.get(key), scope) for key in ("pkg", "exec", "type", "plugin")]
