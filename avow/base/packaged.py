@@ -7,12 +7,12 @@ from functools import cache
 from importlib import resources
 from typing import Any
 
-import yaml
-
 
 @cache
 def packaged(package: str, name: str) -> Any:
     """What a .json or .yaml file in a package says. It is read once: do not change what is returned."""
+    import yaml  # slow, and not needed to import a backend
+
     text = resources.files(package).joinpath(name).read_text(encoding="utf-8")
     return (
         json.loads(text) if name.endswith(".json") else yaml.load(text, getattr(yaml, "CSafeLoader", yaml.SafeLoader))

@@ -109,8 +109,7 @@ def certify(state: State, surveyed: Survey) -> KernelRun:
     entries = counting_now(ledger, workspace.root, system, state.run)
     found = kernel_run(entries, workspace.root, system, state.run)
     twice = sum(one.solvers > 1 for one in found.established)
-    told = f"{len(found.established)} proofs established again, {twice} of them by two solvers"
-    state.certified[system.name] = told
+    state.certified[system.name] = f"{len(found.established)} proofs established again, {twice} of them by two solvers"
     return found
 
 

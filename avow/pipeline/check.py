@@ -71,8 +71,7 @@ def show(found: Iterable[Diagnostic]) -> None:
 
 def refuse(rejected: Rejected) -> TaskError:
     show(rejected.diagnostics)
-    errors = sum(d.is_error for d in rejected.diagnostics)
-    return TaskError(f"{errors} error(s) in the input")
+    return TaskError(f"{sum(d.is_error for d in rejected.diagnostics)} error(s) in the input")
 
 
 def refuse_quietly(name: str) -> TaskError:

@@ -200,8 +200,7 @@ class Cluster:
                 self._looked = time.monotonic(), workers
         if workers is None:
             return _GONE
-        wanted = set(needs(request))
-        return "" if any(wanted <= offered.keys() for offered in workers.values()) else _NOBODY
+        return "" if any(set(needs(request)) <= offered.keys() for offered in workers.values()) else _NOBODY
 
     def _workers(self, seconds: float = CLUSTER_CONNECT) -> Mapping[str, Mapping[str, int]]:
         """The resources of each worker. Raises whatever a client raises that has lost its cluster."""
