@@ -105,8 +105,7 @@ def _line(job: Job, diagnostic: Diagnostic) -> str:
     if span is None or not span.file:
         return told
     path, root = Path(span.file), job.root.resolve()
-    name = path.relative_to(root).as_posix() if path.is_relative_to(root) else path.name
-    return f"{name}:{span.line}: {told}"
+    return f"{(path.relative_to(root).as_posix() if path.is_relative_to(root) else path.name)}:{span.line}: {told}"
 
 
 def job_for(folder: Path, node: str, backend: str, method: str | None, *, wrong: str, hint: str) -> Job:

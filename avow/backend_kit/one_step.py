@@ -27,8 +27,7 @@ def discharge(tool: Backend, job: Job, folder: Path, limits: Limits) -> Report:
     asked, refused = _sayable(tool, job)
     outcomes = tuple(Outcome(o.id, Verdict.UNKNOWN, refused[o.id]) for o in job.obligations if o.id in refused)
     if job.obligations and not asked.obligations:
-        unasked = next(iter(refused.values()))
-        outcomes = (*outcomes, *(Outcome(c.id, Verdict.UNKNOWN, unasked) for c in job.claims))
+        outcomes = (*outcomes, *(Outcome(c.id, Verdict.UNKNOWN, next(iter(refused.values()))) for c in job.claims))
         return Report(outcomes, tool.name, tool.version)
     report = tool.discharge(asked, folder, limits)
     return replace(report, outcomes=(*report.outcomes, *outcomes)) if outcomes else report
@@ -45,8 +44,7 @@ def check(tool: Backend, job: Job) -> Iterator[Diagnostic]:
     asked, refused = _sayable(tool, job)
     for obligation in job.obligations:
         if obligation.id in refused:
-            span = job.clause(obligation).span
-            yield Diagnostic("BACKEND006", refused[obligation.id], span, Severity.WARNING)
+            yield Diagnostic("BACKEND006", refused[obligation.id], job.clause(obligation).span, Severity.WARNING)
     if not refused or asked.obligations:
         yield from tool.check(asked)
 
@@ -75,8 +73,7 @@ def _sayable(tool: Backend, job: Job) -> tuple[Job, Mapping[str, str]]:
     left = tuple(o for o in job.obligations if o.id not in refused)
     if tool.remembers or not any(histories(c.formula) for node in job.contract.nodes for c in node.clauses):
         return (replace(job, obligations=left) if refused else job), refused
-    system = _one_step(job.system)
-    return replace(job, system=system, node=_without(job.node), obligations=left), refused
+    return replace(job, system=_one_step(job.system), node=_without(job.node), obligations=left), refused
 
 
 def refusal(judge: str, node: Node, clause: Clause) -> str | None:

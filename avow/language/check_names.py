@@ -39,7 +39,8 @@ class Names(ABC):
             hint = "compare each time: `s == red or s == green`, or `s in {red, green}`"
         if isinstance(term.sort, FunctionSort) and term.sort.result == BOOL:
             hint = f"apply it to its {len(term.sort.parameters)} argument(s)"
-        self.error("RCL301", f"this must be true or false, and it is of type {shown}", tree, hint=hint)
+        message = f"this must be true or false, and it is of type {shown}"
+        self.error("RCL301", message, tree, hint=hint, notes=self.declared(term))
         return None
 
     @abstractmethod
@@ -64,6 +65,12 @@ class Names(ABC):
         notes: tuple[tuple[str, Span | None], ...] = (),
     ) -> None:
         self.reports.error(code, message, at.start, at.end, hint=hint, notes=notes)
+
+    def declared(self, term: Term) -> tuple[tuple[str, Span | None], ...]:
+        """A note on where a port is declared: the mistake may be there."""
+        role = term.role if isinstance(term, Variable) else Role.BOUND
+        port = self.scope.ports(role).get(term.name) if isinstance(term, Variable) and role is not Role.BOUND else None
+        return ((f"`{port.name}` is declared as {port.type_name} here", port.span),) if port is not None else ()
 
     def span(self, tree: Syntax | Token) -> Span:
         return self.reports.source.span(tree.start, tree.end)
@@ -90,7 +97,7 @@ class Names(ABC):
             if sort == NATURAL and term.sort == INTEGER:
                 hint = "it may be negative; say it the other way round, as in `exists(j in NATURAL | j + 1 == i and …)`"
             message = f"{what} must be of type {show_sort(sort)} and is of type {show_sort(term.sort)}"
-            self.error("RCL303", message, tree, hint=hint)
+            self.error("RCL303", message, tree, hint=hint, notes=self.declared(term))
         return converted
 
     # --- literals ----------------------------------------------------------------------------------------------------

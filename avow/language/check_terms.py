@@ -145,7 +145,8 @@ class Terms(Names):
             return found
         at = tree if found.at is None else arguments[found.at]
         shown = "" if found.at is None else show_sort(terms[found.at].sort)
-        self.error(found.code, found.message.format(shown), at, hint=found.hint)
+        notes = () if found.at is None else self.declared(terms[found.at])
+        self.error(found.code, found.message.format(shown), at, hint=found.hint, notes=notes)
         return None
 
     # --- collections -------------------------------------------------------------------------------------------------
@@ -239,7 +240,8 @@ class Terms(Names):
     def numeric(self, tree: syntax.TermSyntax, operator: str) -> t.Term | None:
         term = self.term(tree)
         if term is not None and not isinstance(term.sort, NUMERIC):
-            self.error("RCL308", f"`{operator}` is of numbers, and this is of type {show_sort(term.sort)}", tree)
+            message = f"`{operator}` is of numbers, and this is of type {show_sort(term.sort)}"
+            self.error("RCL308", message, tree, notes=self.declared(term))
             return None
         return term
 
@@ -335,7 +337,8 @@ class Terms(Names):
                 (item, x) for item, x in ((left_tree, left), (right_tree, right)) if not isinstance(x.sort, NUMERIC)
             ]
             for at, term in wrong:
-                self.error("RCL308", f"`{operator}` is of numbers, and this is of type {show_sort(term.sort)}", at)
+                message = f"`{operator}` is of numbers, and this is of type {show_sort(term.sort)}"
+                self.error("RCL308", message, at, notes=self.declared(term))
             if wrong:
                 return None
         if isinstance(left.sort, s.SetSort) or isinstance(right.sort, s.SetSort):

@@ -355,9 +355,11 @@ WRONG = [  # what rclpy rejects when a node is made: a text of it, what is in it
 @pytest.mark.slow
 @pytest.mark.parametrize(("old", "new", "why"), some(WRONG, 3))
 def test_what_rclpy_rejects_is_an_error_of_the_class(tmp_path: Path, old: str, new: str, why: str) -> None:
-    found = told(drive(system(tmp_path / "w", "rclpy", ROS2.replace(old, new)), "watch"))
-    assert f"Watch is not made: {why}" in found or f"RuntimeError: {why}" in found
+    result = drive(system(tmp_path / "w", "rclpy", ROS2.replace(old, new)), "watch")
+    found = told(result)
+    assert f"Watch cannot be constructed: {why}" in found or f"RuntimeError: {why}" in found
     assert "(watch.py, line 1" in found
+    assert "watch.py:1" in str(result.exception)  # the place is the class's, not the plan's
 
 
 @pytest.mark.slow

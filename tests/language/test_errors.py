@@ -117,6 +117,19 @@ def test_messages(formula: str, message: str) -> None:
     assert any(re.search(message, line) for line in found), found
 
 
+def test_an_error_of_type_says_where_the_port_is_declared() -> None:
+    """The mistake may be there: then each use is an error."""
+    text = "node n {{ inputs( )\n outputs( v : {} )\n topics()\n guarantee g ( {} ) }}"
+    for kind, formula in (
+        ("BOOL", "out.v <= 1"),
+        ("BOOL", "out.v + 1 > 2"),
+        ("BOOL", "abs(out.v) > 2"),
+        ("REAL", "out.v"),
+    ):
+        (fault,) = (d for d in check_text(text.format(kind, formula), "f")[1] if d.is_error)
+        assert [(said, at.line) for said, at in fault.notes if at] == [(f"`v` is declared as {kind} here", 2)]
+
+
 def test_a_limit_may_be_computed_from_constants() -> None:
     assert errors(FRAME % "rose(in.both) -> within[(2 * Limit - 1) steps](once[Limit / 2](in.both))") == []
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import random
+import re
 import struct
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -14,7 +15,7 @@ from typing import Any
 
 from avow.backend_kit.programs.cpython import Subject, Told, ask
 from avow.backend_kit.programs.samples import Pool, leaves, numbers_of, pool, written
-from avow.base.diagnostics import Diagnostic, Rejected, Severity
+from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.base.files import inside, read_text
 from avow.base.process import ToolMissing
 from avow.base.suggestions import did_you_mean, nearest, suggest
@@ -215,8 +216,7 @@ def driver(system: System, name: str) -> Driver:
     if faults:
         raise Rejected(*faults)
     known = require(definitions(plan.messages, plan.ros.distro))
-    header = _ROS1_HEADER if source.kind is Driving.ROSPY else _HEADER
-    known = Definitions({HEADER: header, **known.messages})
+    known = Definitions({HEADER: (_ROS1_HEADER if source.kind is Driving.ROSPY else _HEADER), **known.messages})
     folders = [folder for folder in path.parents if folder.is_relative_to(root)]
     package = next((folder for folder in folders if (folder / "package.xml").is_file()), path.parent)
     ros = {
@@ -233,7 +233,7 @@ def driver(system: System, name: str) -> Driver:
     text = "".join(read_text(file, "utf-8", errors="replace") for file in sorted(read) if file.is_relative_to(root))
     found = Driver(system, node, source, subject, known, topics, text)
     if found.topics.wrong:
-        raise _refused(source, f"{source.class_name} is not made: {found.topics.wrong}")
+        raise _refused(source, f"{source.class_name} cannot be constructed: {found.topics.wrong}")
     if wrong := tuple(found.fits()):
         raise Rejected(*wrong)
     return found
@@ -274,7 +274,12 @@ class Silent(Rejected):
 
 
 def _refused(source: Source, text: str, kind: type[Rejected] = Rejected) -> Rejected:
-    return kind(Diagnostic("DRIVE103", text, source.place.at("source"), Severity.ERROR))
+    """At the line that the text names, if that is of the class's own file; otherwise at the plan's entry."""
+    span, found = source.place.at("source"), re.search(r" \((\S+), line (\d+)\)", text)
+    file = Path(span.file if span else "").parent / source.python
+    if found and found[1] == file.name and file.is_file():
+        span = Span(str(file), int(found[2]), 1, int(found[2]), 2)
+    return kind(Diagnostic("DRIVE103", text, span))
 
 
 def unusable(text: str) -> Rejected:
