@@ -101,15 +101,15 @@ def workspace() -> Workspace:
 
 
 def named_folder(path: Path) -> Path | None:
-    """The folder of the system that is given by its folder, its plan, or its name in the current workspace."""
-    if path.is_dir():
-        return path
+    """The folder of the system that is given by its folder, its plan, or its name in the current workspace; a folder
+    here without plan and contract hides no system of its name."""
     if path.name == "plan.yaml" and path.is_file():
         return path.parent
-    found = find_workspace(Path.cwd().resolve())
-    if found is not None and len(path.parts) == 1 and (found.contracts / path).is_dir():
-        return found.contracts / path
-    return None
+    found = find_workspace(Path.cwd().resolve()) if len(path.parts) == 1 else None
+    named = found.contracts / path if found is not None and (found.contracts / path).is_dir() else None
+    if path.is_dir() and (named is None or (path / "plan.yaml").is_file() or any(path.glob("*.rcl"))):
+        return path
+    return named
 
 
 def system_folder(name: str) -> Path:

@@ -122,6 +122,8 @@ def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 @pytest.mark.parametrize("name", ["check", "compose", "fmt", "sanity", "translate", "refines", "simulate", "monitor"])
 def test_a_system_is_given_by_its_name_or_its_folder_or_its_plan(name: str, named: str, place: Path) -> None:
     given = str(place / "contracts/n") if named == "absolute" else named
+    if named == "n":
+        (place / "n").mkdir()  # an empty folder of its name does not hide it
     rest = {"translate": ["--to", "rcl"], "refines": [given], "fmt": ["--check"], "monitor": ["no.jsonl"]}
     done = CliRunner().invoke(LEAVES[name], [given, *rest.get(name, [])], standalone_mode=False)
     if name in ("simulate", "monitor"):  # neither a scenario nor a trace: but the system was found
