@@ -42,7 +42,6 @@ _WORDS = {
         "The tool that would run the program is missing: nothing is known of these claims.",
     ),
     "withdrawn": ("refutation{s} by what the plan no longer uses", "no longer used", "It refuted, and left the plan."),
-    "conditional": ("review{s} with conditions", "reviewed with conditions", "The reviewer names further conditions."),
     "advice": ("open remark{s}", "remarks", "They fail no gate; read them."),
     "excused": ("finding{s} accepted by a person", "excused", "A named person takes responsibility for a finding."),
     "believed": (
@@ -99,7 +98,6 @@ def deficits(
         "unrun": [f"{v.id}: {method}" for v, method in unrun],
         "programs": [v.id for v in programs],
         "withdrawn": [item.claim for item in open_items if item.kind == "withdrawn"],
-        "conditional": [v.id for v in guarantees if _on_conditions(v)],
         "advice": [item.claim for item in open_items if item.advice and not item.handled],
         "excused": [name for f in findings if f.how == "accepted" and not f.expired for name in f.obligations],
         "believed": [f"{v.id}: {r.method}" for v in views for r in v.records if r.run != run],
@@ -142,7 +140,3 @@ def _unanswered(view: ObligationView) -> Iterator[str]:
         said = [r.verdict for r in view.records if r.method == method]
         if all(verdict in silent for verdict in said):
             yield method
-
-
-def _on_conditions(view: ObligationView) -> bool:
-    return any(weigh(r).support is Status.REVIEWED and r.hypotheses for r in view.records)

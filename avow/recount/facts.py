@@ -135,7 +135,6 @@ class Facts:
             ),
             "unrun": sum(_silent(v, method) for v in within for method, _ in v["planned"]),
             "programs": sum(v["obligation"]["kind"] == "program" and v["status"] == "not-run" for v in self.views),
-            "conditional": sum(any(support(r) == "reviewed" and r["hypotheses"] for r in records(v)) for v in within),
             "advice": sum(i["advice"] and not i["handled"] for i in self.case["open_items"]),
             "excused": sum(
                 len(f["obligations"]) for f in self.case["findings"] if f["how"] == "accepted" and not f["expired"]

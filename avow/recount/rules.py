@@ -41,7 +41,6 @@ _DEFICITS = {
     "planned methods? without an answer": "unrun",
     "claims? about a node's program not run": "programs",
     "refutations? by what the plan no longer uses": "withdrawn",
-    "reviews? with conditions": "conditional",
     "open remarks?": "advice",
     "findings? accepted by a person": "excused",
     "answers? from earlier runs": "believed",

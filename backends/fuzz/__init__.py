@@ -20,7 +20,7 @@ class FuzzBackend(Backend):
 
     name = "fuzz"
     title = "libFuzzer with sanitizers on the node's C++ source; kept runs judged against the contract"
-    version = "4"
+    version = "5"
     strength = Verdict.TESTED
     link = Link.GENERATED
     of = Object.BINARY

@@ -28,8 +28,9 @@ UNDECLARED = {
     **dict.fromkeys((f"_ZNSt3__16chrono12{n}_clock3nowEv" for n in ("system", "steady")), _CLOCK),  # of libc++
     "_ZNSt3__113random_deviceclEv": _CHANCE,
     "_ZNSt3__16thread20hardware_concurrencyEv": _MACHINE,
-    **dict.fromkeys(("gethostname", "uname", "getppid", "gettid", "getloadavg", "getrusage"), _MACHINE),
+    **dict.fromkeys(("gethostname", "uname", "getpid", "getppid", "gettid", "getloadavg", "getrusage"), _MACHINE),
     "_ZNSt6thread20hardware_concurrencyEv": _MACHINE,
+    **dict.fromkeys(("getenv", "secure_getenv", "environ"), "the environment"),
     **dict.fromkeys(("syscall", "dlopen", "dlsym"), _HIDDEN),
 }
 """A function → the unrecorded input that it gives."""

@@ -433,7 +433,7 @@ def test_deficits_are_named_and_counted_on_the_first_screen() -> None:
     for many in (1, 2):
         said = [deficit_words(key, many) for key in _WORDS]
         assert not any("{" in words for words in said)
-    assert deficit_words("conditional", 1) == "review with conditions"
+    assert deficit_words("single", 1) == "guarantee with one method only"
 
 
 def test_deficits_are_of_all_that_the_page_shows() -> None:

@@ -64,6 +64,12 @@ def test_a_model_that_the_program_refutes_shows_nothing() -> None:
     assert case(whole, [G, LINKED], [MODEL, refuted, TESTED]).requirements[0].level is Level.ARGUED
 
 
+def test_a_reviews_condition_is_a_numbered_assumption() -> None:
+    found = made(evidence(G, Verdict.REVIEWED, "review", hypotheses=("the map is loaded",)))
+    assert [a.text for a in found.assumptions] == ["the map is loaded"]
+    assert {d.key for d in found.deficits}.isdisjoint({"open", "conditional"})
+
+
 def test_a_test_of_the_source_is_no_proof() -> None:
     assert words(MODEL, TESTED).startswith("1 proved (model")
     assert words(SOURCE, TESTED) == "1 proved (source in float64)"
