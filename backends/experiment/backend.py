@@ -24,7 +24,7 @@ class ExperimentBackend(Backend):
 
     name = "experiment"
     title = "recorded runs, judged by the guarantee and exact binomial statistics"
-    version = "8"
+    version = "9"
     strength = Verdict.TESTED
     remembers = True
     uses_scenario = False

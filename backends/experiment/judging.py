@@ -18,6 +18,7 @@ from avow.formulas.temporal.responses import due, pending, responding
 from avow.formulas.traversal import transform
 from avow.formulas.values import Value
 from avow.language.contract import Clause
+from avow.language.operators import definition
 from avow.language.printer import show_term
 from avow.language.sorts import BOOL, FunctionSort
 from avow.language.subterms import histories, ports_of, subterms
@@ -27,6 +28,7 @@ from avow.language.terms import (
     Conditional,
     Implies,
     Not,
+    Operation,
     Or,
     Past,
     Quantified,
@@ -169,7 +171,8 @@ def _conditions(formula: Term, assumed: Mapping[str, Term]) -> tuple[Term, ...]:
     assumptions."""
     response = due(formula)
     if response is None:
-        apart = conditions(conjunction(_by_cases(formula, iter(range(CASES)))))
+        chosen = transform(formula, lambda part: (isinstance(part, Operation) and definition(part)) or part)
+        apart = conditions(conjunction(_by_cases(chosen, iter(range(CASES)))))
         found = dict.fromkeys(way for condition in apart for way in _ways(condition))
         return tuple(way for way in found if not _dead(way, assumed))
     if response.full == TRUE:

@@ -111,6 +111,7 @@ CASES = {
         "not in.person and in.speed > 10",
         "not in.person and in.speed <= 10",
     ],
+    "out.distance <= max(in.speed, 3)": ["in.speed > 3", "in.speed <= 3"],
     "out.seen == (if in.person then human else in.kind)": ["in.person", "not in.person"],
     "in.speed > 10 -> out.distance <= (if in.person then 1 else 2)": [
         "in.speed > 10 and in.person",
