@@ -239,7 +239,7 @@ def _whole(number: Callable[[Facts], int]) -> Callable[[Facts, re.Match[str], Bl
     return lambda facts, _match, _block: (str(number(facts)),)
 
 
-_LEVELS = "|".join((*HOLDS, "not shown", "refuted"))
+_LEVELS = "|".join((*reversed(HOLDS), "not shown", "refuted"))
 _STATUS = "proved|checked|tested|monitored|reviewed|justified|argued|partial|unwritten|vacuous|unknown|not-run|error"
 _STATUS += "|stale|missing|unsupported|circular|refuted|contradictory"
 _BOUND = r"(?:, with no bound on failures| \([^()]*: at most [\d.]+ % fail\))?"

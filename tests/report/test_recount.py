@@ -26,7 +26,7 @@ from avow.recount.facts import Facts, upper
 from avow.recount.page import blocks
 from avow.recount.rules import _DEFICITS
 from avow.report import formats, render_all
-from avow.system.plan import Finding
+from avow.system.plan import Finding, Hazard, Requirement
 from report.test_answers_page import CASES as PAGES
 from report.test_answers_page import REPORTS
 
@@ -47,8 +47,15 @@ def weakened() -> Case:
     """Inputs without an answer, a claim that NaN breaks, and a refutation by a method that left the plan."""
     target = guarantee("n", "g")
     known = {"bound": {"cases": 9, "unanswered": 2}, "details": {"no numbers": "in.x = NaN"}}
-    records = [evidence(target, Verdict.TESTED, "hypothesis", **known), evidence(target, Verdict.REFUTED, "dafny")]
-    subject = system({"n": ["g"]}, plans=[node_plan("n", "low", "hypothesis")])
+    sampled = evidence(target, Verdict.TESTED, "hypothesis", **known)
+    records = [sampled, evidence(target, Verdict.REFUTED, "dafny")]
+    asked = Requirement("R", "It is safe.", "n.x > 0", None, ("n.g",))
+    hazards = [
+        Hazard(f"H{at}", f"It burns {'abcdefghij'[at]}", "critical", mitigated_by=("n.g",)[at // 8 :])
+        for at in range(10)
+    ]
+    plans = [node_plan("n", "low", "hypothesis")]
+    subject = system({"n": ["g"]}, plans=plans, requirements=[asked], hazards=hazards)
     return make_case(subject, [target], records, keys=keys_of(records[:1]))
 
 
