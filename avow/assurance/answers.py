@@ -7,6 +7,7 @@ evidence; it is no evidence.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import field
 from enum import StrEnum
@@ -97,6 +98,7 @@ ABOUT = {
 """The topic of each sort of assumption, after a count: ``2 about the world``."""
 
 
+_WORD = re.compile(r"\w+")
 PLATFORM, MODELS, SAMPLES, RECORDINGS, START, REACTION, TOOLS = GENERAL
 
 
@@ -128,6 +130,12 @@ class Assumption:
     def owned(self) -> bool:
         """Whether a person is responsible for it, until a named day."""
         return bool(self.who and (self.until or self.sort is Sort.MEANING))  # a validation ends when a text changes
+
+    @property
+    def reasoned(self) -> bool:
+        """Whether a reason says more than the assumption itself."""
+        reason = f"{self.because} {self.text}".casefold()
+        return not set(_WORD.findall(reason)) <= set(_WORD.findall(self.says.casefold()))
 
     @property
     def general(self) -> bool:

@@ -50,7 +50,7 @@ def trust_lines(
     if tools:
         names = listed([f"{tool} ({many})" for tool, many in sorted(tools.items())], 9)
         lines.append(
-            TrustLine("tools whose answers have no certificate", names, "only a second method checks it", True)
+            TrustLine("tools whose answers have no certificate", names, "only a second method checks them", True)
         )
     bare = [a for a in assumptions if not a.owned]
     if bare:

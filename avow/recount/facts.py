@@ -126,12 +126,13 @@ class Facts:
             "argued": len(self.level("argued")),
             "unvalidated": sum(not r.get("validated") for r in self.requirements),
             "bounded": sum(bool(r.get("bounded")) and r["level"] in HOLDS for r in self.requirements),
+            "bare": sum(_words(f"{a['because']} {a['text']}") <= _words(a["says"]) for a in self.assumptions),
             "unowned": len(self.assumptions) - len(self.owned_ones()),
             "unanswered": sum(any(r["bound"].get("unanswered") for r in records(v)) for v in (*within, *own)),
             "nan": sum(any(r["details"].get("no numbers") for r in records(v)) for v in (*within, *own)),
             "withdrawn": sum(i["kind"] == "withdrawn" for i in self.case["open_items"]),
             "idle": sum(
-                bool(self.requirements) and not any(_id(v) in r["closure"] for r in self.requirements) for v in within
+                not any(_id(v) in r["closure"] for r in self.requirements) for v in within if self.requirements
             ),
             "unrun": sum(_silent(v, method) for v in within for method, _ in v["planned"]),
             "programs": sum(v["obligation"]["kind"] == "program" and v["status"] == "not-run" for v in self.views),
@@ -212,6 +213,10 @@ def support(record: Json) -> str:
 def _way(record: Json) -> tuple[str, str]:
     said = support(record)
     return said, record["of"] if said in ("proved", "checked", "tested", "monitored") else ""
+
+
+def _words(text: str) -> set[str]:
+    return set(re.findall(r"\w+", text.casefold()))
 
 
 def _tool(record: Json) -> str:

@@ -239,6 +239,15 @@ def test_without_owner_or_date_an_assumption_weakens() -> None:
     assert replace(shown, tone=Tone.GREEN).noted == ""
 
 
+def test_a_reason_that_says_no_more_than_its_assumption_is_none() -> None:
+    said = Assumption("A1", "environment.n.x", Sort.WORLD, "It does not move", "", "", "", "", False, ("R",), ())
+    for because in ("", "it does not move", "It does not move [R1]"):
+        assert replace(said, because=because).reasoned == ("R1" in because)
+    assert replace(said, because="it is bolted down").reasoned
+    told = {w.key: w.claims for w in rover_case().deficits}["bare"]
+    assert told == (PLATFORM,)
+
+
 def test_an_assumption_stands_once_whoever_needs_it() -> None:
     said = [
         Statement("environment.in.a", "The map is right", "surveyed", "x", "2030-01-01", "2026-11-20"),
