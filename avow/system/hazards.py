@@ -8,8 +8,6 @@ goal is a hazard with ``kind: security``.
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -20,9 +18,10 @@ from avow.base.packaged import packaged
 from avow.base.plain import bare
 from avow.base.suggestions import suggest
 from avow.language.contract import Node
-from avow.system.plan import Hazard, Located, Plan
+from avow.system.plan import Hazard, Plan
 from avow.system.schema import violations
 from avow.system.strict_yaml import Piece, read_yaml
+from avow.system.tables import csv_rows
 
 COLUMNS: Mapping[str, tuple[str, ...]] = {
     "id": ("id", "uca", "uca id", "hazard id"),
@@ -55,16 +54,17 @@ def read_hazards(
             )
             continue
         try:
-            hazards, wrong = (_table if path.suffix.lower() == ".csv" else _document)(read_regular(path), str(path))
+            root, wrong = (_table if path.suffix.lower() == ".csv" else read_yaml)(read_regular(path), str(path))
+            wrong += violations(root.located(), packaged(*_SCHEMA), "the hazards")
         except OSError as error:
             message = f"{piece.text!r} cannot be read: {error.strerror}"
             faults.append(Diagnostic("PLAN107", message, piece.span))
             continue
         except Rejected as rejected:
-            hazards, wrong = (), rejected.diagnostics
+            wrong = rejected.diagnostics
         files.append(path)
         faults += wrong
-        for hazard in hazards:
+        for hazard in () if wrong else [_hazard(*each) for each in root.keyed()]:
             first = next((other for other in found if other.id == hazard.id), None)
             if first is not None:
                 notes = (("first declared here", first.span),)
@@ -75,27 +75,15 @@ def read_hazards(
     return (tuple(found), tuple(files)), tuple(faults)
 
 
-def _document(data: bytes, file: str) -> tuple[tuple[Hazard, ...], tuple[Diagnostic, ...]]:
-    root, faults = read_yaml(data, file)
-    faults += violations(root.located(), packaged(*_SCHEMA), "the hazards")
-    if faults:
-        return (), faults
-    found = []
-    for name, span, entry in root.keyed():
-        values = {key: entry.texts(key) if key in _LISTS else (entry.said(key) or "") for key in entry.entries or {}}
-        found.append(_hazard(name, values, span))
-    return tuple(found), ()
-
-
-def _table(data: bytes, file: str) -> tuple[tuple[Hazard, ...], tuple[Diagnostic, ...]]:
-    """Rows of a CSV file with a line of headings; several causes, consequences or mitigations are separated by `;`."""
+def _table(data: bytes, file: str) -> tuple[Piece, tuple[Diagnostic, ...]]:
+    """Rows of a CSV file with a line of headings, as a document of YAML has them; several causes, consequences or
+    mitigations are separated by `;`. Raises Rejected."""
     try:
-        reader = csv.reader(io.StringIO(data.decode("utf-8-sig"), newline=""), strict=True)
-        rows = [(reader.line_num, [cell.strip() for cell in row]) for row in reader if any(map(str.strip, row))]
-    except (UnicodeDecodeError, csv.Error) as error:
-        return (), (Diagnostic("PLAN109", f"not a CSV file in UTF-8: {error}", Span(file, 1, 1, 1, 2)),)
+        rows = [(line, row) for line, row in csv_rows(data) if any(row)]
+    except ValueError as error:
+        raise Rejected(Diagnostic("PLAN109", f"not a CSV file in UTF-8: {error}", Span(file, 1, 1, 1, 2))) from None
     if not rows:
-        return (), (Diagnostic("PLAN109", "the table is empty", Span(file, 1, 1, 1, 2)),)
+        raise Rejected(Diagnostic("PLAN109", "the table is empty", Span(file, 1, 1, 1, 2)))
     (line, header), *entries = rows
     fields = {bare(word): field for field, words in COLUMNS.items() for word in words}
     at = {fields[bare(word)]: place for place, word in enumerate(header) if bare(word) in fields}
@@ -103,31 +91,29 @@ def _table(data: bytes, file: str) -> tuple[tuple[Hazard, ...], tuple[Diagnostic
     if missing:
         message = f"the table has no column for {' and '.join(missing)}"
         hint = "; ".join(f"{field}: {', '.join(COLUMNS[field])}" for field in missing)
-        return (), (Diagnostic("PLAN109", message, Span(file, line, 1, line, 2), hint=hint),)
-    found, faults = [], list[Diagnostic]()
+        raise Rejected(Diagnostic("PLAN109", message, Span(file, line, 1, line, 2), hint=hint))
+    hazards, spans, faults = dict[str, Piece](), dict[str, Span](), list[Diagnostic]()
+    whole = Span(file, 1, 1, line, 2)
     for line, row in entries:
         span = Span(file, line, 1, line, 2)
         cells = {field: row[place] for field, place in at.items() if place < len(row) and row[place]}
-        values: dict[str, Any] = {
-            field: tuple(part.strip() for part in text.split(";") if part.strip()) if field in _LISTS else text
-            for field, text in cells.items()
-        }
-        for field in ("severity", "exposure", "kind"):
-            values |= {field: values[field].lower()} if field in values else {}
-        name = values.pop("id", "")
-        entry = {name: {key: list(v) if isinstance(v, tuple) else v for key, v in values.items()}}
-        wrong = violations(Located(entry, span), packaged(*_SCHEMA), "the table")
-        faults += wrong
-        if not wrong:
-            found.append(_hazard(name, values, span))
-    return tuple(found), tuple(faults)
+        name = cells.pop("id", "")
+        if name in spans:
+            notes = (("first declared here", spans[name]),)
+            faults.append(Diagnostic("PLAN110", f"hazard {name!r} is declared twice", span, notes=notes))
+        parts = {}
+        for field, text in cells.items():
+            words = [Piece(span, part.strip(), part.strip()) for part in text.split(";") if part.strip()]
+            plain = text.lower() if field in ("severity", "exposure", "kind") else text
+            parts[field] = Piece(span, items=words) if field in _LISTS else Piece(span, plain, plain)
+        spans[name] = span
+        hazards[name] = Piece(span, entries=parts)
+    return Piece(whole, entries=hazards, keys=spans), tuple(faults)
 
 
-def _hazard(name: str, values: Mapping[str, Any], span: Span) -> Hazard:
-    words: dict[str, Any] = {
-        key: " ".join(value.split()) if isinstance(value, str) else value for key, value in values.items()
-    }
-    return Hazard(name, span=span, **words)
+def _hazard(name: str, span: Span, entry: Piece) -> Hazard:
+    said: dict[str, Any] = {**entry.words(), **{key: entry.texts(key) for key in _LISTS}}
+    return Hazard(name, span=span, **said)
 
 
 def check_mitigations(plan: Plan, nodes: Mapping[str, Node]) -> Iterator[Diagnostic]:

@@ -28,36 +28,32 @@ def read_csv(name: str, path: Path, span: Span) -> tuple[Table | None, tuple[Dia
         return None, (Diagnostic("PLAN109", f"scenario.{name}: {message}", span, notes=notes),)
 
     try:
-        text = read_regular(path).decode("utf-8-sig").replace("\r\n", "\n").replace("\r", "\n")
-    except UnicodeDecodeError:
-        return fault(f"{path.name} is not UTF-8 text")
+        rows = csv_rows(read_regular(path))
     except OSError as error:
         return fault(f"{path.name} cannot be read: {error.strerror}")
-    rows: list[tuple[str, ...]] = []
-    header: tuple[str, ...] | None = None
-    cells = 0
+    except ValueError as error:
+        return fault(f"{path.name} is no CSV in UTF-8: {error}")
+    if not rows:
+        return fault(f"{path.name} is empty")
+    (first, header), *others = rows
+    if "" in header or len(set(header)) != len(header):
+        return fault(f"{path.name}: the columns need names, all different", first)
+    for line, row in others:
+        if len(row) != len(header):
+            return fault(f"{path.name}: {len(row)} cells where {len(header)} are wanted", line)
+    if len(rows) * len(header) > TABLE_CELLS:
+        return fault(f"{path.name} has more than {TABLE_CELLS} cells")
+    return Table(name, header, tuple(row for _, row in others), path), ()
+
+
+def csv_rows(data: bytes) -> list[tuple[int, tuple[str, ...]]]:
+    """The rows of a CSV file that are not empty, each with the line on which it ends. Raises ValueError."""
+    text = data.decode("utf-8-sig").replace("\r\n", "\n").replace("\r", "\n")
     reader = csv.reader(io.StringIO(text, newline=""), strict=True)
     try:
-        for row in reader:
-            if not row:
-                continue
-            found = tuple(cell.strip() for cell in row)
-            cells += len(found)
-            if cells > TABLE_CELLS:
-                return fault(f"{path.name} has more than {TABLE_CELLS} cells", reader.line_num)
-            if header is None:
-                header = found
-                if "" in header or len(set(header)) != len(header):
-                    return fault(f"{path.name}: the columns need names, all different", reader.line_num)
-            elif len(found) != len(header):
-                return fault(f"{path.name}: {len(found)} cells where {len(header)} are wanted", reader.line_num)
-            else:
-                rows.append(found)
+        return [(reader.line_num, tuple(cell.strip() for cell in row)) for row in reader if row]
     except csv.Error as error:
-        return fault(f"{path.name}: {error}", reader.line_num or 1)
-    if header is None:
-        return fault(f"{path.name} is empty")
-    return Table(name, header, tuple(rows), path), ()
+        raise ValueError(f"line {reader.line_num or 1}: {error}") from None
 
 
 def read_rows(name: str, piece: Piece) -> tuple[Table | None, tuple[Diagnostic, ...]]:
