@@ -15,7 +15,7 @@ from typing import Any
 
 from avow.backend_kit.linked import beside
 from avow.backend_kit.protocol import Backend, Job, Limits
-from avow.base.diagnostics import Diagnostic, Rejected, Severity
+from avow.base.diagnostics import Severity
 from avow.base.files import digest_or_missing, sha256
 from avow.base.records import dataclass
 from avow.base.remembered import Shelf
@@ -187,7 +187,7 @@ def method_work(system: System, node: Node, method: Method, offered: Offered = N
         tool.name,
         job.every,
         _keys(job.every, method.id, *parts),
-        _limits(method, options),
+        _limits(options),
         cut=lambda: method_slice(tool, job, files),
         shown=lambda: method_slice(tool, job, files, sentences=True),
         files=files,
@@ -218,24 +218,10 @@ def _compared(system: System, job: Job) -> tuple[str, ...]:
     return (json.dumps(found),) if found else ()
 
 
-_BOUNDS = {"seconds": (0.1, 604_800), "megabytes": (64, 10_000_000), "seed": (0, 2**31 - 1)}
-"""Least and greatest value of each limit: others are typing errors or rejected by system calls."""
-
-
-def _limits(method: Method, options: Mapping[str, Any]) -> Limits:
-    """Raises Rejected for a value out of range."""
-    wrong = []
-    for name, (least, most) in _BOUNDS.items():
-        value = options.get(name, least)
-        number = isinstance(value, int) or (isinstance(value, float) and name == "seconds")
-        if isinstance(value, bool) or not number or not least <= value <= most:
-            kind = "a number" if name == "seconds" else "a whole number"
-            message = f"{method.id}: {name} must be {kind} from {least} to {most}"
-            wrong.append(Diagnostic("PLAN105", message, method.options.at(name)))
-    if wrong:
-        raise Rejected(*wrong)
-    given = {name: options[name] for name in _BOUNDS if name in options}
-    return replace(Limits(), **given)
+def _limits(options: Mapping[str, Any]) -> Limits:
+    """The plan's limits, whose range its schema gives."""
+    kinds = {"seconds": float, "megabytes": int, "seed": int}
+    return replace(Limits(), **{name: kind(options[name]) for name, kind in kinds.items() if name in options})
 
 
 def programs(works: Iterable[Work]) -> tuple[str, ...]:

@@ -28,7 +28,7 @@ def thermostat(workspace: Path) -> Path:
     "wrong",
     [
         *("seconds: abc", "seconds: -1", "seconds: 0", "seconds: .nan", "seconds: {}", "seconds: 1e999"),
-        *("seconds: '60'", "megabytes: 1.5", "megabytes: -3", "megabytes: 99999999999999999999", "megabytes: true"),
+        *("seconds: '60'", "megabytes: 100.5", "megabytes: -3", "megabytes: 99999999999999999999", "megabytes: true"),
         *("seed: [1]", "seed: 1.5", "seed: -1", "seed: 99999999999999999999"),
     ],
 )
