@@ -25,8 +25,6 @@ from avow.system.strict_yaml import Piece, read_yaml
 
 # -- methods -----------------------------------------------------------------------------------------------------------
 
-_METHOD_ID = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,60}\Z")
-
 
 def read_methods(node: str, piece: Piece) -> tuple[tuple[Method, ...], tuple[Diagnostic, ...]]:
     """The methods of a node, each with a unique id; and their faults."""
@@ -34,9 +32,7 @@ def read_methods(node: str, piece: Piece) -> tuple[tuple[Method, ...], tuple[Dia
     faults: list[Diagnostic] = []
     used: set[str] = set()
     for item in piece.each("methods"):
-        method = _method(node, item, piece.at("mapping"), used, faults)
-        if method is not None:
-            found.append(method)
+        found.append(_method(node, item, piece.at("mapping"), used, faults))
     return tuple(found), tuple(faults)
 
 
@@ -53,52 +49,25 @@ def _with_mapping(options: Piece, shared: Piece) -> Piece:
     return replace(options, entries={**(options.entries or {}), "mapping": both})
 
 
-def _method(node: str, item: Piece, mapping: Piece | None, used: set[str], faults: list[Diagnostic]) -> Method | None:
+def _method(node: str, item: Piece, mapping: Piece | None, used: set[str], faults: list[Diagnostic]) -> Method:
     if item.entries is None:
         backend, options = item.text, Piece(item.span, entries={})
     else:
         backend, options = next(iter(item.entries.items()))
         if options.value is None and options.entries is None and options.items is None and not options.text:
             options = Piece(options.span, entries={})
-    if options.entries is None and (options.items is not None or not isinstance(options.value, str)):
-        # A bare text (`review: reviews/x.yaml`) is accepted or rejected by the backend's own schema.
-        faults.append(
-            Diagnostic("PLAN105", f"nodes.{node}: the options of {backend!r} must be a mapping", options.span)
-        )
-        return None
-    if not _METHOD_ID.match(backend):
-        faults.append(Diagnostic("PLAN105", f"nodes.{node}: {backend!r} cannot be a backend's name", item.span))
-        return None
     if mapping is not None and backend in READ_MESSAGES:
         options = _with_mapping(options, mapping)
     given = options.at("id")
     name = given.text if given is not None else backend
-    if given is not None and (not _METHOD_ID.match(name) or name in used):
-        why = "is used twice" if name in used else "must be a word"
-        faults.append(Diagnostic("PLAN110", f"nodes.{node}: the method's id {name!r} {why}", given.span))
+    if given is not None and name in used:
+        faults.append(Diagnostic("PLAN110", f"nodes.{node}: the method's id {name!r} is used twice", given.span))
     number = 2
     while name in used:
         name = f"{backend}-{number}"
         number += 1
     used.add(name)
-    return Method(name, backend, options.located(), _taken_on(node, name, options.at("guarantees"), faults))
-
-
-def _taken_on(node: str, method: str, piece: Piece | None, faults: list[Diagnostic]) -> tuple[str, ...]:
-    """The clauses that a method names; empty if the plan names none, which means all of the node's."""
-    if piece is None:
-        return ()
-    where = f"nodes.{node}: {method}: guarantees"
-    names = piece.texts()
-    if not names or not all(names) or piece.entries is not None:
-        hint = "leave the key out for all of the node's guarantees, or the method for none"
-        faults.append(
-            Diagnostic("PLAN105", f"{where}: names of guarantees are wanted, one at least", piece.span, hint=hint)
-        )
-    for index, name in enumerate(names):
-        if name in names[:index] and piece.items is not None:
-            faults.append(Diagnostic("PLAN105", f"{where}: {name!r} stands there twice", piece.items[index].span))
-    return names
+    return Method(name, backend, options.located(), options.texts("guarantees"))
 
 
 # -- source ------------------------------------------------------------------------------------------------------------
@@ -111,20 +80,9 @@ def read_source(name: str, node: Piece) -> tuple[Source | None, tuple[Diagnostic
     """The plan's entry for a node's source; and contradictions in it."""
     piece, numbers, memory = node.at("source"), node.at("numbers"), node.at("memory")
     if piece is None:
-        alone = [(key, part) for key, part in (("numbers", numbers), ("memory", memory)) if part is not None]
-        hint = "add  source: {python: src/node.py, class: Node}"
-        return None, tuple(
-            Diagnostic("PLAN110", f"nodes.{name}: {key} is said of a source, and there is none", part.span, hint=hint)
-            for key, part in alone
-        )
+        return None, ()
     texts = {key: part.text for key, part in (piece.entries or {}).items()}
     faults: list[Diagnostic] = []
-    if "python" not in texts and "cpp" not in texts:
-        faults.append(Diagnostic("PLAN104", f"nodes.{name}.source: either python or cpp is wanted", piece.span))
-    elif ("python" in texts) != ("class" in texts):
-        absent = "class" if "python" in texts else "python"
-        message = f"nodes.{name}.source: python and class go together, and {absent} is missing"
-        faults.append(Diagnostic("PLAN104", message, piece.span))
     if texts.get("kind", "step") != "step" and memory is not None:
         message = f"nodes.{name}: memory is of a class with a method step, and kind is {texts['kind']}"
         faults.append(Diagnostic("PLAN110", message, memory.span))

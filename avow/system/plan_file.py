@@ -7,7 +7,6 @@ It needs no contract, whose files the plan names: `avow.system.names` then check
 from __future__ import annotations
 
 import re
-from collections import Counter
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
@@ -16,7 +15,7 @@ from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.base.files import inside, read_regular, sha256
 from avow.base.remembered import Shelf
 from avow.base.suggestions import nearby
-from avow.ros.names import Placed, Resolver, is_name
+from avow.ros.names import Placed, Resolver
 from avow.system.hazards import read_hazards
 from avow.system.launched import read_launched
 from avow.system.node_plan import files_of, read_methods, read_source
@@ -137,7 +136,7 @@ class _PlanReader:
             pictures=tuple(self.pictures(scenario)),
             subsystems=tuple(self.subsystems()),
             statements=self.noted(read_statements(self.root)),
-            ros=self.noted(_ros(self.root)),
+            ros=_ros(self.root),
             launched=launched,
             included=(*hazard_files, *(launched.files if launched is not None else ())),
         )
@@ -206,8 +205,6 @@ class _PlanReader:
         for piece in self.root.each("connections"):
             entries = piece.entries or {}
             delayed, initial = entries.get("delayed"), entries.get("initial")
-            if initial is not None and not (delayed and delayed.value):
-                self.fault("PLAN110", "an initial value needs a delayed edge", initial.span, hint="add  delayed: true")
             for target in entries["to"].each():
                 yield Edge(
                     _endpoint(entries["from"].text),
@@ -308,17 +305,11 @@ class _PlanReader:
     def goals(self) -> Iterator[ComposeGoal]:
         for name, _, piece in self.root.keyed("compose"):
             select = piece.texts("select")
-            for twice in [node for node, count in Counter(select).items() if count > 1]:
-                self.fault("PLAN110", f"compose.{name}.select: {twice!r} is named twice", piece.span)
             yield ComposeGoal(name, select, piece.said("rule"), piece.located(), piece.span)
 
     def subsystems(self) -> Iterator[Subsystem]:
         for name, span, piece in self.root.keyed("subsystems"):
-            nodes, folder = piece.at("nodes"), piece.at("system")
-            if nodes is None and folder is None:
-                self.fault("PLAN104", f"subsystems.{name}: either nodes or system is wanted", piece.span)
-            if nodes is not None and folder is not None:
-                self.fault("PLAN110", f"subsystems.{name}: either nodes or system, not both", folder.span)
+            folder = piece.at("system")
             path = self.beside(folder) if folder is not None else None
             yield Subsystem(name, piece.texts("nodes"), piece.said("rule"), piece.located(), path, span)
 
@@ -373,35 +364,12 @@ def _value(piece: Piece) -> str:
     return plain(piece.value) if isinstance(piece.value, bool) else piece.text
 
 
-# -- how nodes and topics are called -----------------------------------------------------------------------------------
+def _ros(root: Piece) -> Ros:
+    placed = tuple((node, _placed(node, entry)) for node, _, entry in root.keyed("ros", "nodes"))
+    return Ros(root.said("ros", "distro"), Resolver(placed))
 
 
-def _ros(root: Piece) -> tuple[Ros, list[Diagnostic]]:
-    """The entry for ROS in a well-shaped plan, and the faults in its names."""
-    faults: list[Diagnostic] = []
-    piece = root.at("ros")
-    if piece is None:
-        return Ros(), faults
-    placed = tuple((node, _placed(node, entry, faults)) for node, _, entry in piece.keyed("nodes"))
-    return Ros(piece.said("distro"), Resolver(placed)), faults
-
-
-def _placed(node: str, entry: Piece, faults: list[Diagnostic]) -> Placed:
-    name = entry.at("name")
-    whole = f"/{name.text.lstrip('/')}" if name is not None else f"/{node}"
-    if name is not None and not is_name(name.text):
-        faults.append(_no_name(f"ros.nodes.{node}.name", name))
-    remaps: list[tuple[str, str]] = []
-    for old, span, new in entry.keyed("remap"):
-        if not is_name(old):
-            faults.append(_no_name(f"ros.nodes.{node}.remap", Piece(span, text=old)))
-        elif not is_name(new.text):
-            faults.append(_no_name(f"ros.nodes.{node}.remap.{old}", new))
-        else:
-            remaps.append((old, new.text))
-    return Placed(whole, tuple(remaps), entry.span, name is not None)
-
-
-def _no_name(where: str, piece: Piece) -> Diagnostic:
-    hint = "letters, digits and _, set apart by /, with / or ~ before it"
-    return Diagnostic("PLAN105", f"{where}: {piece.text!r} is no name that ROS takes", piece.span, hint=hint)
+def _placed(node: str, entry: Piece) -> Placed:
+    name = entry.said("name")
+    remaps = tuple((old, new.text) for old, _, new in entry.keyed("remap"))
+    return Placed(f"/{(name or node).lstrip('/')}", remaps, entry.span, name is not None)

@@ -161,11 +161,12 @@ def _explain(error: Any, root: Piece, whole: str, also: Iterable[Any] = ()) -> I
             known = list(error.schema.get("properties", {}))
             for key in (key for key in piece.entries or {} if key not in known):
                 yield fault(f"unknown key {key!r}", "PLAN103", piece.key_span(key), suggest(key, known))
-        case "required":
-            missing = [key for key in error.validator_value if key not in (piece.entries or {})]
-            named = str(error.message).split("'")[1] if "'" in str(error.message) else ""
-            if named in missing:
-                yield fault(f"the key {named!r} is missing", "PLAN104")
+        case "required" | "dependentRequired":
+            named = str(error.message).split("'")[1]
+            yield fault(f"the key {named!r} is missing", "PLAN104")
+        case "uniqueItems":
+            twice = next(item for at, item in enumerate(error.instance) if item in error.instance[:at])
+            yield fault(f"{_show(twice)} is given twice")
         case "enum" | "const":
             allowed = [json.dumps(word).strip('"') for one in (error, *also) for word in _words(one)]
             if len(allowed) == 1:

@@ -15,7 +15,6 @@ CONFIRMED = "requirements: {{R: {{text: t, validation: {{who: A. Person, date: {
 REQUIREMENT = "requirements: {{R: {{text: t, {}}}}}"
 BOTH = REQUIREMENT.format("formula: a, temporal: b")
 PICTURE = "scenario: {{t: [{{x: 1, y: 2}}]}}\npictures: {{p: {{table: {}, x: x, y: {}}}}}"
-EDGE = "connections: [{{from: a.x, to: a.y{}}}]"
 
 
 def findings(obligation: str, more: str = "") -> str:
@@ -45,23 +44,8 @@ def findings(obligation: str, more: str = "") -> str:
             "PLAN110",
             "'a/?' may stand for several",
         ),
-        ("subsystems: {s: {nodes: [a]}}", "subsystems: {s: {}}", "PLAN104", "subsystems.s: either nodes or system"),
         ("subsystems: {s: {system: ../b}}", "subsystems: {s: {system: ../c}}", "PLAN107", "there is no folder '../c'"),
         ("subsystems: {s: {system: ../b}}", "subsystems: {s: {system: ../../b}}", "PLAN108", "holds the system's"),
-        (
-            "subsystems: {s: {system: ../b}}",
-            "subsystems: {s: {system: ../b, nodes: [a]}}",
-            "PLAN110",
-            "either nodes or system, not both",
-        ),
-        ("compose: {D: {select: [a, b]}}", "compose: {D: {select: [a, b, a]}}", "PLAN110", "'a' is named twice"),
-        (EDGE.format(", delayed: true, initial: 1"), EDGE.format(", initial: 1"), "PLAN110", "needs a delayed edge"),
-        (
-            EDGE.format(", delayed: true"),
-            EDGE.format(", delayed: false, initial: 1"),
-            "PLAN110",
-            "needs a delayed edge",
-        ),
         (PICTURE.format("t", "y"), PICTURE.format("u", "y"), "PLAN109", "pictures.p: the scenario has no table 'u'"),
         (PICTURE.format("t", "y"), PICTURE.format("t", "z"), "PLAN109", "pictures.p: table 't' has no column 'z'"),
         ("contract: a.rcl", "contract: b.rcl", "PLAN107", "there is no file 'b.rcl'"),

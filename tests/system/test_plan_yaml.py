@@ -66,7 +66,7 @@ def test_scalars_are_never_guessed(text: str, value: object) -> None:
         ("connections:\n  - {from: a.x, to: b.x, delayed: yes}\n", 2, 35, "true or false is wanted"),
         ("connections:\n  - {from: a, to: b.x}\n", 2, 12, "node.port"),
         ("connections:\n  - {to: b.x}\n", 2, 5, "'from' is missing"),
-        ("connections:\n  - {from: a.x, to: b.x, initial: 3}\n", 2, 35, "needs a delayed edge"),
+        ("connections:\n  - {from: a.x, to: b.x, initial: 3}\n", 2, 5, "the key 'delayed' is missing"),
         ("compose: {D1: {rule: R7}}\n", 1, 22, "not one of R1, R2, R3, R4"),
         ("compose: {start: {}}\n", 1, 11, "cannot be used here"),
         ("compose: {D.1: {}}\n", 1, 11, "cannot be used here"),
@@ -109,11 +109,11 @@ def test_faults_are_located(tmp_path: Path, text: str | bytes, line: int, column
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("nodes: {n: {methods: [{hoare: {guarantees: []}}]}}", "n: hoare: guarantees: names of guarantees are wanted"),
-        ("nodes: {n: {methods: [{hoare: {guarantees: }}]}}", "n: hoare: guarantees: names of guarantees are wanted"),
-        ("nodes: {n: {methods: [{hoare: {guarantees: [[g]]}}]}}", "names of guarantees are wanted"),
-        ("nodes: {n: {methods: [{hoare: {guarantees: {g: 1}}}]}}", "names of guarantees are wanted"),
-        ("nodes: {n: {methods: [{hoare: {guarantees: [g, g]}}]}}", "'g' stands there twice"),
+        ("nodes: {n: {methods: [{hoare: {guarantees: []}}]}}", "hoare.guarantees: must not be empty"),
+        ("nodes: {n: {methods: [{hoare: {guarantees: }}]}}", "hoare.guarantees: text or a list is wanted"),
+        ("nodes: {n: {methods: [{hoare: {guarantees: [[g]]}}]}}", "guarantees[0]: text is wanted"),
+        ("nodes: {n: {methods: [{hoare: {guarantees: {g: 1}}}]}}", "guarantees: text or a list is wanted"),
+        ("nodes: {n: {methods: [{hoare: {guarantees: [g, g]}}]}}", "'g' is given twice"),
         ("compose: {D1: {select: []}}", "compose.D1.select: must not be empty"),
     ],
 )

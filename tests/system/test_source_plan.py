@@ -53,10 +53,10 @@ def test_every_fault_in_one_round(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("node", "code", "words"),
     [
-        ("    numbers: float64\n", "PLAN110", "numbers is said of a source"),
-        ("    memory: {last: self.last}\n", "PLAN110", "memory is said of a source"),
-        ("    source: {python: src.py}\n", "PLAN104", "class is missing"),
-        ("    source: {class: Watchdog}\n", "PLAN104", "either python or cpp"),
+        ("    numbers: float64\n", "PLAN104", "'source' is missing"),
+        ("    memory: {last: self.last}\n", "PLAN104", "'source' is missing"),
+        ("    source: {python: src.py}\n", "PLAN104", "'class' is missing"),
+        ("    source: {class: Watchdog}\n", "PLAN104", "'python' or 'cpp' is missing"),
         ("    source: {python: src.py, class: 'a b'}\n", "PLAN105", "class"),
         ("    source: {python: src.py, class: W}\n    numbers: float16\n", "PLAN105", "float16"),
         ("    source: {python: src.py, class: W}\n    memory: {last: last}\n", "PLAN105", "last"),

@@ -92,7 +92,7 @@ def test_faults_of_plan_and_contract_come_together(tmp_path: Path) -> None:
             "",
         ),
         ("compose: {D: {select: [a, bb]}}", "PLAN106", 1, "'bb'", "`b`"),
-        ("compose: {D: {select: [a, a]}}", "PLAN110", 1, "twice", ""),
+        ("compose: {D: {select: [a, a]}}", "PLAN105", 1, "twice", ""),
         ("nodes: {aa: {}}", "PLAN106", 1, "'aa'", "`a`"),
         ("nodes:\n  a:\n    methods: [{hoare: {guarantees: [g9]}}]", "PLAN106", 3, "g9", "g1"),
         ("nodes: {a: {methods: [{hoare: {id: x}}, {dafny: {id: x}}]}}", "PLAN110", 1, "used twice", ""),
