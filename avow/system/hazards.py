@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from avow.base.diagnostics import Diagnostic, Rejected, Span
-from avow.base.files import inside, read_regular
+from avow.base.files import read_regular
 from avow.base.packaged import packaged
 from avow.base.plain import bare
 from avow.base.suggestions import suggest
@@ -39,30 +39,19 @@ _SCHEMA = "avow.system", "hazards.schema.json"
 _LISTS = ("causes", "consequences", "mitigated_by")
 
 
-def read_hazards(
-    plan: Path, pieces: Iterable[Piece]
-) -> tuple[tuple[tuple[Hazard, ...], tuple[Path, ...]], tuple[Diagnostic, ...]]:
-    """The hazards in the files that a plan names under `hazards`, those files, and the faults in them."""
+def read_hazards(files: Iterable[Path]) -> tuple[tuple[Hazard, ...], tuple[Diagnostic, ...]]:
+    """The hazards in these files, and the faults in them."""
     found: list[Hazard] = []
-    files: list[Path] = []
     faults: list[Diagnostic] = []
-    for piece in pieces:
-        path = inside(plan.parent, piece.text)
-        if path is None:
-            faults.append(
-                Diagnostic("PLAN108", f"the path {piece.text!r} leads out of the system's folder", piece.span)
-            )
-            continue
+    for path in files:
         try:
             root, wrong = (_table if path.suffix.lower() == ".csv" else read_yaml)(read_regular(path), str(path))
             wrong += violations(root.located(), packaged(*_SCHEMA), "the hazards")
         except OSError as error:
-            message = f"{piece.text!r} cannot be read: {error.strerror}"
-            faults.append(Diagnostic("PLAN107", message, piece.span))
-            continue
+            message = f"{path.name} cannot be read: {error.strerror}"
+            wrong = (Diagnostic("PLAN107", message, Span(str(path), 1, 1, 1, 1)),)
         except Rejected as rejected:
             wrong = rejected.diagnostics
-        files.append(path)
         faults += wrong
         for hazard in () if wrong else [_hazard(*each) for each in root.keyed()]:
             first = next((other for other in found if other.id == hazard.id), None)
@@ -72,7 +61,7 @@ def read_hazards(
                     Diagnostic("PLAN110", f"hazard {hazard.id!r} is declared twice", hazard.span, notes=notes)
                 )
             found.append(hazard)
-    return (tuple(found), tuple(files)), tuple(faults)
+    return tuple(found), tuple(faults)
 
 
 def _table(data: bytes, file: str) -> tuple[Piece, tuple[Diagnostic, ...]]:

@@ -113,7 +113,7 @@ class _PlanReader:
         self.model_graph()
         scenario = self.scenario()
         launched = self.noted(read_launched(self.path, self.root.each("ros", "launch")))
-        hazards, hazard_files = self.noted(read_hazards(self.path, self.root.each("hazards")))
+        hazard_files = [path for piece, path in self.paths("hazards") if self.present(piece, path)]
         return Plan(
             system=name,
             title=self.root.said("title") or name,
@@ -125,7 +125,7 @@ class _PlanReader:
             environment=tuple(self.environment()),
             scenario=scenario,
             requirements=tuple(self.requirements()),
-            hazards=hazards,
+            hazards=self.noted(read_hazards(hazard_files)),
             compose=tuple(self.goals()),
             nodes=tuple(self.nodes()),
             policy=located["policy"],
