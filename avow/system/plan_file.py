@@ -7,7 +7,7 @@ It needs no contract, whose files the plan names: `avow.system.names` then check
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -240,20 +240,8 @@ class _PlanReader:
                 table = self.table(name, piece)
                 if table is not None:
                     tables[name] = table
-        interpret: dict[str, tuple[str, tuple[str, ...]]] = {}
-        for port, _, piece in self.root.keyed("scenario", "interpret"):
-            found = interpretation(piece.text, tables)
-            if isinstance(found, str):
-                self.fault("PLAN109", f"scenario.interpret.{port}: {found}", piece.span)
-            else:
-                interpret[port] = found
-        domains: dict[str, tuple[str, ...]] = {}
-        for name, _, piece in self.root.keyed("scenario", "domains"):
-            values = domain(piece, tables)
-            if isinstance(values, str):
-                self.fault("PLAN109", f"scenario.domains.{name}: {values}", piece.span)
-            else:
-                domains[name] = values
+        interpret = self.given("interpret", lambda piece: interpretation(piece.text, tables))
+        domains = self.given("domains", lambda piece: domain(piece, tables))
         steps = self.root.at("scenario", "steps")
         parts = [
             *(f"table {t.name!r} {t.columns!r} {t.rows!r}" for t in sorted(tables.values(), key=lambda t: t.name)),
@@ -269,6 +257,16 @@ class _PlanReader:
             sha256("\n".join([*parts, f"steps {deepest!r}"])),
             sha256("\n".join(parts)),
         )
+
+    def given(self, key: str, read: Callable[[Piece], T]) -> dict[str, T]:
+        """What the scenario gives to each name under a key."""
+        found: dict[str, T] = {}
+        for name, _, piece in self.root.keyed("scenario", key):
+            try:
+                found[name] = read(piece)
+            except ValueError as wrong:
+                self.fault("PLAN109", f"scenario.{key}.{name}: {wrong}", piece.span)
+        return found
 
     def table(self, name: str, piece: Piece) -> Table | None:
         if piece.items is not None:
@@ -304,8 +302,7 @@ class _PlanReader:
 
     def goals(self) -> Iterator[ComposeGoal]:
         for name, _, piece in self.root.keyed("compose"):
-            select = piece.texts("select")
-            yield ComposeGoal(name, select, piece.said("rule"), piece.located(), piece.span)
+            yield ComposeGoal(name, piece.texts("select"), piece.said("rule"), piece.located(), piece.span)
 
     def subsystems(self) -> Iterator[Subsystem]:
         for name, span, piece in self.root.keyed("subsystems"):

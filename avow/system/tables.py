@@ -73,56 +73,53 @@ def read_rows(name: str, piece: Piece) -> tuple[Table | None, tuple[Diagnostic, 
     return (None, tuple(faults)) if faults else (Table(name, columns, tuple(found)), ())
 
 
-def interpretation(text: str, tables: dict[str, Table]) -> tuple[str, tuple[str, ...]] | str:
-    """``places(x, y, id)`` → table and columns, or the fault in it."""
+def interpretation(text: str, tables: dict[str, Table]) -> tuple[str, tuple[str, ...]]:
+    """``places(x, y, id)`` → table and columns. Raises ValueError."""
     found = _COLUMNS_OF.match(text)
     if not found:
-        return f"{text!r} has not the form table(column, …)"
+        raise ValueError(f"{text!r} has not the form table(column, …)")
     name = found[1]
     columns = tuple(column.strip() for column in found[2].split(",")) if found[2].strip() else ()
     table = tables.get(name)
     if table is None:
-        return f"there is no table {name!r}; {suggest(name, tables) or 'the scenario has none'}"
+        raise ValueError(f"there is no table {name!r}; {suggest(name, tables) or 'the scenario has none'}")
     for column in columns:
         if column not in table.columns:
-            return f"the table {name} has no column {column!r}; {suggest(column, table.columns)}"
+            raise ValueError(f"the table {name} has no column {column!r}; {suggest(column, table.columns)}")
     return name, columns
 
 
-def domain(piece: Piece, tables: dict[str, Table]) -> tuple[str, ...] | str:
-    """``table.column``, ``low..high``, a value or a list of values → the values as text, or the fault in it."""
+def domain(piece: Piece, tables: dict[str, Table]) -> tuple[str, ...]:
+    """``table.column``, ``low..high``, a value or a list of values → the values as text. Raises ValueError."""
     if piece.items is not None:
         found: dict[str, None] = {}
         for item in piece.items:
-            values = _each_row(item.text, tables)
-            if isinstance(values, str):
-                return values
-            found.update(dict.fromkeys(values))
+            found.update(dict.fromkeys(_each_row(item.text, tables)))
         return tuple(found)
     text = piece.text
     span = _RANGE.match(text)
     if span:
         low, high = int(span[1]), int(span[2])
         if high < low:
-            return f"the range {text} is empty"
+            raise ValueError(f"the range {text} is empty")
         if high - low >= RANGE_VALUES:
-            return f"the range {text} has more than {RANGE_VALUES} values"
+            raise ValueError(f"the range {text} has more than {RANGE_VALUES} values")
         return tuple(str(number) for number in range(low, high + 1))
     return _each_row(text, tables)
 
 
-def _each_row(text: str, tables: dict[str, Table]) -> tuple[str, ...] | str:
-    """``places.id`` or ``move(places.x, places.y)`` with every row's cells; other text unchanged."""
+def _each_row(text: str, tables: dict[str, Table]) -> tuple[str, ...]:
+    """``places.id`` or ``move(places.x, places.y)`` with every row's cells; other text unchanged. Raises ValueError."""
     places = [found for found in _CELL.finditer(text) if found[1] in tables]
     if not places:
         return (text,)
     names = {found[1] for found in places}
     if len(names) > 1:
-        return f"{text!r} draws on several tables: {', '.join(sorted(names))}"
+        raise ValueError(f"{text!r} draws on several tables: {', '.join(sorted(names))}")
     table = tables[names.pop()]
     for found in places:
         if found[2] not in table.columns:
-            return f"the table {table.name} has no column {found[2]!r}; {suggest(found[2], table.columns)}"
+            raise ValueError(f"the table {table.name} has no column {found[2]!r}; {suggest(found[2], table.columns)}")
     at = {column: k for k, column in enumerate(table.columns)}
     rows = (
         _CELL.sub(lambda found, row=row: row[at[found[2]]] if found[1] == table.name else found[0], text)  # type: ignore[misc]
