@@ -12,7 +12,7 @@ from avow.assurance.signed import sign_case
 from avow.base.codec import document
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.files import write
-from avow.base.persons import unreadable
+from avow.base.persons import unreadable, wrong_day
 from avow.base.workspace import find_workspace, report_folder, workspace
 from avow.cli.options import PathArgument, json_option
 from avow.evidence.envelope import seal_lines
@@ -39,10 +39,9 @@ def command(name: str, who: str, until: str, key: object, as_json: bool) -> int:
     place = find_workspace(folder.resolve()) or workspace()
     case = read_case(folder)
     today = datetime.now().astimezone().date()
-    try:
-        last = date.fromisoformat(until)
-    except ValueError:
-        raise Rejected(Diagnostic("SIGN005", f"--until: {until!r} is no date of the calendar")) from None
+    if wrong_until := wrong_day(until, past=False):
+        raise Rejected(Diagnostic("SIGN005", f"--until: {wrong_until}"))
+    last = date.fromisoformat(until)
     if last < today:
         raise Rejected(Diagnostic("SIGN005", f"--until: {until} is past"))
     if why := unreadable(" ".join(who.split())):

@@ -36,11 +36,7 @@ def check_subsystems(plan: Plan, contract: Contract) -> tuple[Diagnostic, ...]:
                 faults.append(Diagnostic("PLAN106", message, span, hint=suggest(member, [*nodes, *groups])))
             elif member in home:
                 where, first = home[member]
-                message = (
-                    f"subsystems.{name}.nodes: {member!r} is named twice"
-                    if where == name
-                    else f"subsystems.{name}.nodes: {member!r} is in {where!r} already; subsystems do not overlap"
-                )
+                message = f"subsystems.{name}.nodes: {member!r} is in {where!r} already; subsystems do not overlap"
                 faults.append(Diagnostic("PLAN110", message, span, notes=(("first here", first),)))
             else:
                 home[member] = (name, span)

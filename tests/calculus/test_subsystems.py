@@ -295,7 +295,7 @@ def test_an_own_input_of_a_subsystem(tmp_path: Path) -> None:
     [
         ("subsystems:\n  s: {nodes: [reader, gradr]}", "PLAN106", 2, "did you mean `grader`"),
         ("subsystems:\n  s: {nodes: [reader]}\n  t: {nodes: [reader]}", "PLAN110", 3, "is in 's' already"),
-        ("subsystems:\n  s: {nodes: [reader, reader]}", "PLAN110", 2, "named twice"),
+        ("subsystems:\n  s: {nodes: [reader, reader]}", "PLAN105", 2, "is given twice"),
         ("subsystems:\n  reader: {nodes: [grader]}", "PLAN110", 2, "also a node"),
         ("subsystems:\n  D: {nodes: [grader]}\ncompose: {D: {}}", "PLAN110", 2, "also a derivation"),
         ("subsystems:\n  s: {nodes: [t]}\n  t: {nodes: [s]}", "PLAN110", 2, "contain one another: s → t → s"),
