@@ -11,20 +11,24 @@ from typing import Any
 from avow.backend_kit.protocol import COMMON_OPTIONS, Job
 from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.base.files import inside, read_regular
+from avow.base.packaged import packaged
 from avow.base.remembered import Shelf
 from avow.base.suggestions import nearby, suggest
 from avow.system.plan import Located
 
+_SHARED = packaged("avow.backend_kit", "options.json")
+DURATION: Mapping[str, Any] = _SHARED["duration"]
+REASON: Mapping[str, Any] = _SHARED["reason"]
+NAN: Mapping[str, Any] = _SHARED["nan"]
+"""The option `nan` of a method that runs or reads a program."""
+READING: Mapping[str, Any] = _SHARED["reading"]
+"""The options of every method that judges messages."""
+
 
 def schema(properties: Mapping[str, Any], *required: str, **more: Any) -> dict[str, Any]:
     """The JSON schema (2020-12) of a method's options, which allows no others; `more` adds constraints."""
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **mapping(properties, *required), **more}
-
-
-def mapping(properties: Mapping[str, Any], *required: str) -> dict[str, Any]:
-    """An option that is a mapping and allows no other keys."""
     closed = {"properties": dict(properties), "required": [*required], "additionalProperties": False}
-    return {"type": "object", **closed}
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", "type": "object", **closed, **more}
 
 
 def text(what: str) -> dict[str, Any]:
@@ -40,10 +44,6 @@ def file(what: str) -> dict[str, Any]:
 def whole_number(what: str, most: int, default: int) -> dict[str, Any]:
     """An option that is a number from 1 to `most`."""
     return {"type": "integer", "minimum": 1, "maximum": most, "default": default, "description": what}
-
-
-NAN = {"const": "possible", "description": "a REAL input may be NaN or an infinity: what goes wrong then refutes"}
-"""The option `nan` of a method that runs or reads a program."""
 
 
 def file_path(job: Job, key: str) -> Path | None:
@@ -134,97 +134,3 @@ def misshapen(
     if isinstance(options.data, Mapping):
         options = replace(options, data={k: v for k, v in options.data.items() if k not in COMMON_OPTIONS})
     return violations(options, schema, whole, shelf)
-
-
-# -- the reading of messages--------------------------------------------------------------------------------------------
-
-PATH = text("a field of the message: pose.position.x, ranges[0]")
-DURATION = {
-    "type": "string",
-    "pattern": "^[0-9]+([.][0-9]+)? ?(us|ms|s|min)$",
-    "description": "a time with a unit, such as 50 ms",
-}
-_CELL = mapping(
-    {
-        "table": text("a table of the plan's scenario"),
-        "key": text("the message's field that names the row"),
-        "by": text("the table's column that the key is looked up in"),
-        "column": text("the column of the value"),
-        "as": text("the type in which the node holds the value: float64"),
-    },
-    *("table", "key", "by", "column"),
-)
-ARGUMENT = {"oneOf": [PATH, _CELL]}
-REASON = {"type": "string", "pattern": r"[^\W_]", "description": "a reason in words (`...` is none)"}
-_BECAUSE = {"because": REASON}
-_PORTS = {"input": PATH, "output": PATH}
-_LATENCY = {"by": {"const": "latency"}, "latency": DURATION, "jitter": DURATION, **_BECAUSE}
-_ANSWERS = (
-    mapping({"by": {"const": "arrival"}, **_BECAUSE}, "by", "because"),
-    mapping({"by": {"const": "order"}, **_BECAUSE}, "by", "because"),
-    mapping({"by": {"const": "call"}}, "by"),
-    mapping({"by": {"const": "stamp"}, **_PORTS}, "by"),
-    mapping({"by": {"const": "key"}, **_PORTS}, "by", "input", "output"),
-    mapping(_LATENCY, "latency", "jitter", "because"),
-)
-
-READING: dict[str, Any] = {
-    "when": {
-        "enum": ["outputs", "any", "every"],
-        "description": "judge a clause when each of its outputs has been published since it was last judged "
-        "(default), when any of them is, or at every event that changes one of its variables",
-    },
-    "answers": {
-        "description": "which input an answer answered: without it, verdicts are shown and are no evidence",
-        "oneOf": [*_ANSWERS],
-    },
-    "mapping": {
-        "type": "object",
-        "description": "how messages become values of the node's variables (in.r, out.command)",
-        "additionalProperties": {
-            "oneOf": [
-                PATH,
-                {"type": "array", "items": PATH, "minItems": 1, "description": "the fields, in order"},
-                {
-                    "type": "object",
-                    "properties": {
-                        "topic": text("a topic's name, if not the contract's"),
-                        "type": text("the topic's ROS type, if not in the contract"),
-                        "field": PATH,
-                        "fields": {"type": "array", "items": PATH, "minItems": 1},
-                        "each": text("a field that holds a list of tuples"),
-                        "hold": {
-                            "enum": ["latest", "seen"],
-                            "description": "a relation holds at the latest message's tuples (default), or at all "
-                            "that were seen",
-                        },
-                        "values": {
-                            "type": "object",
-                            "additionalProperties": {"type": "string"},
-                            "description": "a message's word: the contract's name",
-                        },
-                        "elsewhere": {
-                            "description": "a function's value where no message has given one; of anything else, "
-                            "the value where there is no reading"
-                        },
-                        "take": {"enum": ["min", "max", "count"], "description": "of the items of an array"},
-                        "nan": {"const": "none", "description": "a NaN is no reading"},
-                        "inf": {"const": "none", "description": "an infinity is no reading"},
-                        "initial": {"description": "the value before the first message"},
-                        "scenario": {"const": True, "description": "the plan's interpretation, at all times"},
-                        "previous": text("an output's value of the step before"),
-                        "constructor": text("the field that names the constructor"),
-                        "arguments": {
-                            "type": "object",
-                            "additionalProperties": {"type": "array", "items": ARGUMENT},
-                            "description": "constructor: the fields of its arguments (a constructor's name may "
-                            "also stand beside `constructor` itself)",
-                        },
-                    },
-                },
-            ]
-        },
-    },
-}
-"""`when`, `answers`, `mapping`: how a node's messages are read, and when they are judged. Every method that judges
-messages has these options."""

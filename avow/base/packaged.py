@@ -14,6 +14,8 @@ def packaged(package: str, name: str) -> Any:
     import yaml  # slow, and not needed to import a backend
 
     text = resources.files(package).joinpath(name).read_text(encoding="utf-8")
-    return (
-        json.loads(text) if name.endswith(".json") else yaml.load(text, getattr(yaml, "CSafeLoader", yaml.SafeLoader))
-    )
+    if name.endswith(".json"):
+        return json.loads(text)
+    import yaml  # importing a backend does not need it
+
+    return yaml.load(text, getattr(yaml, "CSafeLoader", yaml.SafeLoader))

@@ -14,13 +14,12 @@ from avow.backend_kit.protocol import Backend, Job, Limits, OutsideCheck, Report
 from avow.base.codes import Catalogue
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.files import read_text
+from avow.base.packaged import packaged
 from avow.base.verdict import Link, Verdict
 from avow.language.contract import Clause, Node
 from avow.language.sorts import DataSort, EnumSort, FunctionSort, RealSort, Sort
 from avow.language.subterms import subterms
 from avow.language.terms import Arithmetic, Compare, Negative, Operation, Term
-
-from .schema import SCHEMA
 
 
 class AjpfBackend(Backend):
@@ -38,7 +37,7 @@ class AjpfBackend(Backend):
         "formulas mean to it, not which percepts an input is"
     )
     link = Link.MAPPED
-    options_schema = SCHEMA
+    options_schema = packaged("avow.backends.ajpf", "options.json")
     codes = Catalogue("avow.backends.ajpf")
     green_means = (
         "Every property that the guarantee became, through the plan's table and for the plan's instances, holds in "

@@ -19,8 +19,9 @@ from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
 
-from avow.backend_kit.given import REASON, file_bytes, mapping, schema
+from avow.backend_kit.given import file_bytes
 from avow.base.diagnostics import Diagnostic, Rejected
+from avow.base.packaged import packaged
 from avow.system.plan import Located
 from avow.system.schema import violations
 from avow.system.strict_yaml import read_yaml
@@ -31,26 +32,6 @@ from .tuning import DRAWS
 
 NOTHING = "nothing"
 KEEP = "keep"
-
-_TEXT = {"type": "string"}
-_WORDS = {"type": "array", "items": _TEXT, "minItems": 1}
-_NARROWED = {"type": "object", "additionalProperties": _WORDS}
-_DRAWS = {
-    "at_start": {"type": "boolean"},
-    "at_quiescence": {"enum": ["once", "repeatedly", "never"]},
-    "quiet": {"type": "array", "items": _TEXT},
-}
-_SCHEMA = schema(
-    {
-        "about": _TEXT,
-        "draws": mapping(_DRAWS),
-        "percepts": _NARROWED,
-        "start": _NARROWED,
-        "after": {"type": "object", "additionalProperties": _NARROWED},
-        "fair": {"type": "array", "items": mapping({"percept": _TEXT, "because": REASON}, "percept", "because")},
-    },
-    "percepts",
-)
 
 
 def _listed(names: Sequence[str], last: str = "and") -> str:
@@ -137,7 +118,10 @@ def read_environment(path: Path) -> Environment:
     if problems:
         raise Rejected(*problems)
     located = piece.located()
-    faults = [replace(fault, code="AJPF110") for fault in violations(located, _SCHEMA, "environment")]
+    faults = [
+        replace(fault, code="AJPF110")
+        for fault in violations(located, packaged("avow.backends.ajpf", "environment.schema.json"), "environment")
+    ]
     if faults:
         raise Rejected(*faults)
     return _read(located)

@@ -12,6 +12,7 @@ from typing import Any
 from avow.backend_kit.given import existing_file
 from avow.backend_kit.protocol import Job
 from avow.base.diagnostics import Diagnostic, Rejected, Span
+from avow.base.packaged import packaged
 from avow.formulas.renaming import bound_names
 from avow.language.load import parse_formula
 from avow.language.sorts import BUILTINS, IntegerSort, NaturalSort, Sort
@@ -25,7 +26,6 @@ from .mapping import Row, domain_of
 from .parser import read_system
 from .psl import AGENT_NAME, KEYWORDS, Formula, Modality, atoms
 from .psl_parser import Malformed, index_names, instantiate, parse_psl
-from .schema import SCHEMA
 from .shape import TooComplex, shape
 from .syntax import Program
 from .tuning import DEFAULT_STATES, INDEX_VALUES
@@ -75,7 +75,10 @@ def read(job: Job) -> Setup:
     """Raises Rejected with every problem."""
     options = job.method.options
     own = replace(options, data=job.options)
-    odd = [replace(fault, code="AJPF119") for fault in violations(own, SCHEMA, "options")]
+    odd = [
+        replace(fault, code="AJPF119")
+        for fault in violations(own, packaged("avow.backends.ajpf", "options.json"), "options")
+    ]
     if odd:
         raise Rejected(*odd)
     reader = _OptionsReader(job)

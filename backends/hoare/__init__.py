@@ -5,42 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 
-from avow.backend_kit.given import file, schema
 from avow.backend_kit.one_step import unsaid
 from avow.backend_kit.protocol import Backend, Job, Limits, OutsideCheck, Report, Tool
 from avow.base.codes import Catalogue
 from avow.base.diagnostics import Diagnostic, Rejected
+from avow.base.packaged import packaged
 from avow.base.tools import z3_tool
 from avow.base.verdict import Link, Verdict
 from avow.formulas.values import Value
 from avow.language.contract import Clause, Node
-
-_TABLE = {
-    "type": "object",
-    "description": "an input, output or relation of the contract (in.r, out.done(i)) and what it is in the program; "
-    "by default a variable of the same name",
-    "additionalProperties": {"type": ["string", "number", "boolean"]},
-}
-
-
-_INVARIANTS = {
-    "type": ["string", "array"],
-    "items": {"type": "string"},
-    "description": "what links the program's MEMORY and the steps before, ahead of every step: high == "
-    "previous(counted(reading > 10 since reading <= 10), 0)",
-}
-
-_TERMINATION = {
-    "type": "object",
-    "description": "a person's word that the program's loops without a VARIANT end",
-    "properties": {
-        "because": {"type": "string", "minLength": 1, "description": "why they end"},
-        "who": {"type": "string", "minLength": 1, "description": "who says so"},
-        "until": {"type": "string", "format": "date", "description": "the last day on which that is accepted"},
-    },
-    "required": ["because", "who", "until"],
-    "additionalProperties": False,
-}
 
 
 class Hoare(Backend):
@@ -56,15 +29,7 @@ class Hoare(Backend):
     portable = True
     runs_models = True
     link = Link.GENERATED
-    options_schema = schema(
-        {
-            "program": file("the program's file"),
-            "variables": _TABLE,
-            "termination": _TERMINATION,
-            "invariants": _INVARIANTS,
-        },
-        "program",
-    )
+    options_schema = packaged("avow.backends.hoare", "options.json")
     codes = Catalogue("avow.backends.hoare")
     green_means = (
         "Every run of the program that starts in an input allowed by the assumptions ends in outputs that meet the "
