@@ -15,25 +15,29 @@ import json
 import sys
 import threading
 import traceback
+import zlib
 from collections.abc import Callable, Sequence
 from typing import Any
 
 from .messages import Messages
 from .refusals import Finder, Refusals, Strict, called_from
 from .steps import plain
+from .turns import ORDERS, Turns
 
 REQUEST, RESPONSE = "_Request", "_Response"
-"""The ends of the names of a service's two message types."""
-STATE = ("said", "heard", "spoken", "due", "groups", "together", "waiting", "dropped")
+ACTION = ("_Goal", "_Result", "_Feedback")
+"""The ends of the names of the message types of a service, and of an action."""
+STATE = ("said", "heard", "spoken", "due", "together", "waiting", "dropped", "calls", "taken", "_order")
 """The attributes that loading the file may change, and each run changes."""
 
 
-class Driven(Refusals, Messages):
+class Driven(Refusals, Messages, Turns):
     """The stand-in for ROS in one process."""
 
     def __init__(self, spec: Any, own: Sequence[str]) -> None:
         Refusals.__init__(self, spec, own)
         Messages.__init__(self, spec)
+        Turns.__init__(self)
         Strict._driven = self
         self.name: str = spec["name"]
         self.topics = frozenset(spec["topics"])
@@ -45,25 +49,25 @@ class Driven(Refusals, Messages):
         self.heard: dict[str, tuple[tuple[str, Callable[[Any], Any]], ...]] = {}
         self.spoken: dict[str, str] = {}
         self.due: list[tuple[int, int, Callable[[], Any]]] = []
-        self.groups: set[Any] = set()
-        """Callback groups of callbacks (None: a node's own)."""
         self.together: list[list[str]] = []
         """Topics whose messages belong together by their stamps."""
-        self.waiting: dict[str, tuple[Callable[[Any], None], ...]] = {}
-        """Topic of a service's responses → what is done with the next ones."""
+        self.waiting: dict[str, tuple[tuple[str, Callable[[Any], None]], ...]] = {}
+        """Topic of responses → the calls that are to be answered, and what is done with the responses."""
         self.dropped: tuple[int, ...] = ()
         """Responses that answer no request, by their numbers among all messages."""
+        self.calls: dict[int, str] = {}
+        """A response's number among all messages → the call that it answers."""
         self.services: dict[Any, str] = {}
-        """Class of a service → its type (``package/Type``)."""
+        """Class of a service or an action → its type (``package/Type``)."""
         self.most: int = spec["most"]
-        self.ran = self.handled = self._order = 0
+        self.ran = self.number = self._order = 0
         self._loaded: dict[str, Any] = {}
 
     def begin(self, now: int) -> None:
         """A new run, from the state after the file was loaded. The list of refusals is kept."""
         self._loaded = self._loaded or {name: copy.copy(getattr(self, name)) for name in STATE}
         vars(self).update({name: copy.copy(value) for name, value in self._loaded.items()})
-        self.now, self.ran, self.handled = now, 0, 0
+        self.now, self.ran, self.number = now, 0, 0
 
     # -- names, time, topics -----------------------------------------------------------------------------
 
@@ -89,26 +93,48 @@ class Driven(Refusals, Messages):
         heapq.heappush(self.due, (at, self._order, act))
 
     def until(self, end: int) -> None:
-        """Run everything that is due up to `end`, in order of time."""
-        while self.due and self.due[0][0] <= end:
-            at, _, act = heapq.heappop(self.due)
-            self.now = max(self.now, at)
-            self.count()
-            self.call(act)
-        self.now = max(self.now, end)
+        """Run everything that is due up to `end`, in order of time; what waits at `end` itself may wait for more."""
+        while True:
+            if self.due and self.due[0][0] <= self.now:
+                self.count()
+                self.call(heapq.heappop(self.due)[2])
+            elif end > self.now and self.next() is not None:
+                self.go_on()
+            elif end <= self.now:
+                break
+            else:
+                self.take(*self.ready)
+                self.now = min(end, self.due[0][0]) if self.due else end
 
     def count(self) -> None:
         self.ran += 1
         if self.ran > self.most:
             raise self.refuse(f"more than {self.most} callbacks")
 
-    def call(self, act: Callable[..., Any], *given: Any) -> Any:
-        """What a callback of the class returns."""
+    def call(self, act: Callable[..., Any], *given: Any, free: bool = False) -> Any:
+        """What a callback of the class returns. `free`: a coroutine may wait, as it is of no callback group."""
         returned = act(*given)
         if hasattr(returned, "__await__"):
-            returned.close()
-            raise self.refuse("a callback that is a coroutine")
+            return self._proceed(returned, free)
         return returned
+
+    def _proceed(self, coroutine: Any, free: bool) -> Any:
+        try:
+            awaited: Any = coroutine.send(None) if self.kind == "rclpy" else None
+        except StopIteration as end:
+            return end.value
+        if not free or not hasattr(awaited, "add_done_callback"):
+            coroutine.close()
+            raise self.refuse("a coroutine that waits")
+        return awaited.add_done_callback(lambda _: self._proceed(coroutine, free))
+
+    def pause(self, nanoseconds: int) -> None:
+        """The running callback sleeps."""
+        turn = self.running
+        if turn is None or threading.current_thread() is not turn:
+            raise self.refuse("time.sleep")
+        self.later(self.now + nanoseconds, lambda: self.wake(turn))
+        turn.sleep()
 
     def hear(self, topic: Any, kind: Any, act: Callable[[Any], Any]) -> tuple[str, Any]:
         """The topic's whole name, and what is in `heard` for it."""
@@ -125,18 +151,25 @@ class Driven(Refusals, Messages):
             raise TypeError(f"{whole} is {self.spoken[whole]}, and published as {name}")
         return whole
 
-    def say(self, topic: str, message: Any) -> None:
-        if threading.current_thread() is not threading.main_thread():
+    def say(self, topic: str, message: Any, call: str = "") -> None:
+        """`call`: of which the message is a part."""
+        if threading.current_thread() is not (self.running or threading.main_thread()):
             raise self.refuse("what is published by a thread of its own")
+        if self.order == 2 and self.running:
+            self.pause(0)
         data = self.data({"n": self.spoken[topic]}, message, topic)
-        self.said.append([topic, self.now, data, self.handled])
+        self.said.append([topic, self.now, data, len(self.taken), call])
         for _, act in self.heard.get(topic, ()):
             self.later(self.now, lambda act=act: act(self.value({"n": self.spoken[topic]}, data)))  # type: ignore[misc]
 
     def deliver(self, topic: str, data: Any) -> None:
+        if not self.order:
+            self.taken[self.number] = None
         for kind, act in self.heard.get(topic, ()):
             self.count()
             self.call(act, self.value({"n": kind}, data))
+        if not any(turn.number == self.number for turn in self.ready):
+            self.taken[self.number] = None
 
     def parts(self, name: Any, service: Any) -> tuple[str, str, str]:
         """A service's whole name, and the topics of its requests and responses."""
@@ -145,36 +178,52 @@ class Driven(Refusals, Messages):
         whole = self.whole(name)
         return whole, f"{whole}/{REQUEST.lower()}", f"{whole}/{RESPONSE.lower()}"
 
-    def serve(self, name: Any, service: Any, act: Callable[[Any], Any]) -> str:
-        """A service whose requests are answered at once: `act` returns the response."""
+    def serve(self, name: Any, service: Any, act: Callable[[Any], Any], group: Any = None) -> str:
+        """A service whose requests are answered by `act`, which returns the response."""
         whole, asked, told = self.parts(name, service)
         if asked in self.heard:
             raise TypeError(f"{whole} has two servers")
         self.spoken[told] = self.services[service] + RESPONSE
         kind = self.services[service] + REQUEST
-        self.heard[asked] = ((kind, lambda request: self.say(told, self.call(act, request))),)
+
+        def answer(request: Any, call: str) -> None:
+            self.say(told, self.call(act, request), call)
+
+        turn = self.turn(group, answer)
+        self.heard[asked] = ((kind, lambda request: turn(request, str(self.number or len(self.taken)))),)
         return whole
 
     def ask(self, name: Any, service: Any) -> Callable[[Any, Callable[[Any], None]], None]:
-        """The function that sends a request to a service, and what is done with the response. Responses come in the
-        order of the requests."""
+        """The function that sends a request to a service, and what is done with the response."""
         _, asked, told = self.parts(name, service)
         self.spoken[asked] = self.services[service] + REQUEST
+        self.await_on(told, self.services[service] + RESPONSE)
+
+        def send(request: Any, act: Callable[[Any], None]) -> None:
+            call = self.new_call()
+            self.waiting[told] = (*self.waiting.get(told, ()), (call, act))
+            self.say(asked, request, call)
+
+        return send
+
+    def new_call(self) -> str:
+        self._order += 1
+        return f"own {self._order}"
+
+    def await_on(self, told: str, kind: str, *, last: bool = True) -> None:
+        """A topic of answers to what is `waiting`, in the order of the requests. `last`: one for each."""
 
         def answered(response: Any) -> None:
             first, *rest = self.waiting.get(told) or (None,)
-            self.waiting[told] = tuple(rest)
             if first is None:
-                self.dropped = (*self.dropped, self.handled)
-            else:
-                first(response)
+                self.dropped = (*self.dropped, self.number)
+                return
+            if last:
+                self.waiting[told] = tuple(rest)
+            self.calls[self.number] = first[0]
+            first[1](response)
 
-        def send(request: Any, act: Callable[[Any], None]) -> None:
-            self.waiting[told] = (*self.waiting.get(told, ()), act)
-            self.say(asked, request)
-
-        self.heard[told] = ((self.services[service] + RESPONSE, answered),)
-        return send
+        self.heard[told] = ((kind, answered),)
 
     # -- modules -----------------------------------------------------------------------------------------
 
@@ -186,10 +235,16 @@ class Driven(Refusals, Messages):
         for name, made in self.classes.items():
             package, _, called = name.partition("/")
             service = name.removesuffix(REQUEST)
-            part = "srv" if name.endswith((REQUEST, RESPONSE)) else "msg"
+            action = name.rpartition("_")[0]
+            whole = all(f"{action}{end}" in self.classes for end in ACTION) and self.kind == "rclpy"
+            part = "action" if whole else "srv" if name.endswith((REQUEST, RESPONSE)) else "msg"
             content = packages.setdefault(package, {"msg": {}}).setdefault(part, {})
             made.__module__ = f"{package}.{part}"
             content[called if part == "msg" or self.kind == "rclpy" else called.replace("_", "")] = made
+            if whole and name.endswith(ACTION[0]):
+                parts = {end[1:]: self.classes[f"{action}{end}"] for end in ACTION}
+                content[action.rpartition("/")[2]] = both = type(action.rpartition("/")[2], (), parts)
+                self.services[both] = action
             if service != name and service + RESPONSE in self.classes:
                 parts = {"Request": made, "Response": self.classes[service + RESPONSE]}
                 content[called.removesuffix(REQUEST)] = both = type(called.removesuffix(REQUEST), (), parts)
@@ -218,6 +273,7 @@ def answers(driven: Driven, make: Callable[[Any, Any], Any]) -> Callable[[Any, A
         def run(case: str) -> str:
             asked = json.loads(case)
             driven.begin(int(asked["start"]))
+            driven.order = zlib.crc32(case.encode()) % len(ORDERS) if asked["orders"] else 0
             driven.params = plain(spec["params"])
             wrong = on = state = ""
             try:
@@ -225,31 +281,36 @@ def answers(driven: Driven, make: Callable[[Any, Any], Any]) -> Callable[[Any, A
                 state = getattr(node, "_avow_state", "")
                 if state and not asked["events"]:
                     node._avow_activate()  # for its topics
-                for topic, at, data in asked["events"]:
+                for number, (topic, at, data) in enumerate(asked["events"], 1):
                     driven.until(int(at))
-                    driven.handled, on = driven.handled + 1, topic
+                    driven.number, on = number, topic
                     driven.deliver(topic, data)
-                    on = ""
+                    on, driven.number = "", 0
                     driven.until(driven.now)  # messages that it sent to itself
-                driven.until(int(asked["end"]))
+                driven.until(int(asked["end"]) + 1)
                 del node
-                if threading.active_count() > 1:
-                    driven.refuse("a thread of its own")
             except Exception as error:
                 wrong = f"{type(error).__name__}: {error}"[:300] + _meant(error)
                 wrong += called_from(traceback.extract_tb(error.__traceback__))
+            said = list(driven.said)  # without what a callback says when it is cut
+            driven.cut()
+            if threading.active_count() > 1 and not wrong:
+                driven.refuse("a thread of its own")
             return json.dumps(
                 {
                     "heard": {topic: kinds[0][0] for topic, kinds in driven.heard.items() if kinds},
                     "spoken": driven.spoken,
-                    "said": driven.said,
+                    "said": said,
                     "refused": driven.refused,
                     "wrong": wrong,
-                    "after": driven.handled,
+                    "after": driven.number or len(driven.taken),
+                    "taken": list(driven.taken | dict.fromkeys(range(1, len(asked["events"]) + 1))),
                     "on": on,
                     "state": state,
                     "together": driven.together,
                     "dropped": driven.dropped,
+                    "order": ORDERS[driven.order],
+                    "calls": [driven.calls.get(number, "") for number in range(len(asked["events"]) + 1)],
                 }
             )
 

@@ -8,11 +8,14 @@ from typing import Any
 
 from .parameters import Parameters
 from .refusals import Strict, nothing
+from .turns import FREE
 
 SECOND = 10**9
 DEFAULTS = {"raw": False, "autostart": True, "start_parameter_services": True, "enable_rosout": True}
 DEFAULTS |= {"allow_undeclared_parameters": False, "automatically_declare_parameters_from_overrides": False}
 KEYWORDS = {*DEFAULTS, "callback_group", "event_callbacks", "qos_overriding_options", "content_filter_options", "clock"}
+KEYWORDS |= {f"{part}_qos_profile" for part in ("goal_service", "result_service", "cancel_service", "feedback_pub")}
+KEYWORDS |= {f"{part}_qos_profile" for part in ("status_pub", "feedback_sub", "status_sub")}
 KEYWORDS |= {"publisher_class", "context", "cli_args", "parameter_overrides", "rosout_qos_profile"}
 """Keyword arguments of rclpy's Node and its methods: any other one is an error of the class, there as here."""
 OF_NODES: tuple[str, ...] = ("create_", "destroy_", "get_", "set_", "add_", "remove_", "declare_", "undeclare_")
@@ -22,7 +25,18 @@ OF_NODES += ("clients", "executor", "default_callback_group", "waitables", "guar
 
 
 class MutuallyExclusiveCallbackGroup:
-    """A callback group that changes nothing: callbacks run one at a time."""
+    """A callback group: while one of its callbacks sleeps, the others wait."""
+
+    reentrant = False
+
+
+class ReentrantCallbackGroup(MutuallyExclusiveCallbackGroup):
+    """A callback group whose callbacks do not wait for each other."""
+
+    reentrant = True
+
+
+GROUPS: dict[str, Any] = {kind.__name__: kind for kind in (MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup)}
 
 
 @functools.total_ordering
@@ -142,8 +156,9 @@ class Publisher(Strict):
 class Timer(Strict):
     _called = "rclpy.timer.Timer"
 
-    def __init__(self, period: int, callback: Any) -> None:
-        self.timer_period_ns, self.callback, self.turn, self.over = period, callback, 0, False
+    def __init__(self, period: int, callback: Any, group: Any = None) -> None:
+        self.timer_period_ns, self.turn, self.over = period, 0, False
+        self.callback = self._driven.turn(group, lambda: self._driven.call(callback))
         self.reset()
 
     def fire(self, turn: int) -> None:
@@ -174,9 +189,9 @@ class Subscription(Strict):
 class Service(Strict):
     _called = "rclpy.service.Service"
 
-    def __init__(self, kind: Any, name: str, callback: Any) -> None:
+    def __init__(self, kind: Any, name: str, callback: Any, group: Any = None) -> None:
         self.srv_type, self.callback = kind, callback
-        self.srv_name = self._driven.serve(name, kind, lambda request: callback(request, kind.Response()))
+        self.srv_name = self._driven.serve(name, kind, lambda request: callback(request, kind.Response()), group)
 
 
 class Clock(Strict):
@@ -184,6 +199,10 @@ class Clock(Strict):
 
     def now(self) -> Any:
         return Time(nanoseconds=self._driven.now)
+
+    def sleep_for(self, rel_time: Duration, context: Any = None) -> bool:
+        self._driven.pause(rel_time.nanoseconds)
+        return True
 
 
 class Future(Strict):
@@ -211,9 +230,15 @@ class Future(Strict):
 
     def add_done_callback(self, callback: Any) -> None:
         if self._done:
-            self._driven.later(self._driven.now, lambda: callback(self))
+            act = self._driven.turn(FREE, lambda: self._driven.call(callback, self, free=True))
+            self._driven.later(self._driven.now, act)
         else:
             self._callbacks.append(callback)
+
+    def __await__(self) -> Any:
+        while not self._done:
+            yield self
+        return self._result
 
 
 class Client(Strict):
@@ -253,12 +278,8 @@ class Node(Parameters):
             if name not in KEYWORDS:
                 instead = ": the depth of the queue is its qos_profile" if name == "queue_size" else ""
                 raise TypeError(f"{called}() has no argument {name!r}{instead}")
-            if type(given) is MutuallyExclusiveCallbackGroup:
-                self._avow.groups.add(given)
-            elif given is not DEFAULTS.get(name):
+            if given is not DEFAULTS.get(name) and not isinstance(given, MutuallyExclusiveCallbackGroup):
                 raise self._avow.refuse(f"rclpy.node.{called}({name}=)")
-        if more.get("callback_group") is None:
-            self._avow.groups.add(None)
         if not isinstance(qos, kinds) or (isinstance(qos, int) and qos < 0):
             text = f"qos_profile of {called}() is {qos!r}, and has to be a QoSProfile, or for a topic a depth from 0"
             raise (ValueError if isinstance(qos, kinds) else TypeError)(text)
@@ -267,25 +288,24 @@ class Node(Parameters):
         self, msg_type: Any, topic: str, callback: Any, qos_profile: Any = None, **more: Any
     ) -> Any:
         self._avow_plain("Node.create_subscription", more, qos_profile)
-        return Subscription(*self._avow.hear(topic, msg_type, callback))
+        act = self._avow.turn(more.get("callback_group"), lambda message: self._avow.call(callback, message))
+        return Subscription(*self._avow.hear(topic, msg_type, act))
 
     def create_publisher(
         self, msg_type: Any, topic: str, qos_profile: Any = None, *, _avow_made: Any = Publisher, **more: Any
     ) -> Any:
-        groups = set(self._avow.groups)
         self._avow_plain("Node.create_publisher", more, qos_profile)
-        self._avow.groups = groups  # a publisher has no callbacks
         return _avow_made(self._avow.speak(topic, msg_type), msg_type)
 
     def create_timer(self, timer_period_sec: float, callback: Any, callback_group: Any = None, **more: Any) -> Any:
         self._avow_plain("Node.create_timer", {"callback_group": callback_group, **more})
         if not timer_period_sec > 0:
             raise ValueError(f"a timer's period is above 0, not {timer_period_sec!r}")
-        return Timer(int(float(timer_period_sec) * SECOND), callback)
+        return Timer(int(float(timer_period_sec) * SECOND), callback, callback_group)
 
     def create_service(self, srv_type: Any, srv_name: str, callback: Any, **more: Any) -> Any:
         self._avow_plain("Node.create_service", more, more.pop("qos_profile", QoSProfile(depth=10)), QoSProfile)
-        return Service(srv_type, srv_name, callback)
+        return Service(srv_type, srv_name, callback, more.get("callback_group"))
 
     def create_client(self, srv_type: Any, srv_name: str, **more: Any) -> Any:
         self._avow_plain("Node.create_client", more, more.pop("qos_profile", QoSProfile(depth=10)), QoSProfile)

@@ -10,10 +10,10 @@ from collections import UserList, UserString
 from collections.abc import Callable, Sequence, Set
 from typing import Any
 
-from . import filters, lifecycle, parameters
+from . import actions, filters, lifecycle, parameters
 from .callbacks import Driven, answers
 from .messages import INTEGERS
-from .nodes import ENTITIES, QOS, Duration, Future, Log, MutuallyExclusiveCallbackGroup, Node, Time
+from .nodes import ENTITIES, GROUPS, QOS, Duration, Future, Log, Node, Time
 from .refusals import Strict
 
 SECOND = 10**9
@@ -33,7 +33,8 @@ def modules(spec: Any, own: Sequence[str]) -> Callable[[Any, Any], Callable[[str
         "time": {"Time": Time},
         "duration": {"Duration": Duration},
         "qos": QOS,
-        "callback_groups": {"MutuallyExclusiveCallbackGroup": MutuallyExclusiveCallbackGroup},
+        "action": actions.CONTENT,
+        "callback_groups": GROUPS,
         "executors": {kind.__name__: kind for kind in (SingleThreadedExecutor, MultiThreadedExecutor, _Shutdown)},
         "exceptions": parameters.EXCEPTIONS,
         "lifecycle": lifecycle.CONTENT,
@@ -50,13 +51,13 @@ def modules(spec: Any, own: Sequence[str]) -> Callable[[Any, Any], Callable[[str
     def make(made: Any, params: Any) -> Any:
         if not issubclass(made, Node):
             raise TypeError(f"{made.__name__} is no rclpy.node.Node")
+        text = inspect.getsource(sys.modules[made.__module__])
+        driven.sleeps, driven.parallel = "sleep" in text, MultiThreadedExecutor.__name__ in text
+        driven.order *= driven.parallel
         node = made()
         if isinstance(node, lifecycle.LifecycleNode) and not node._avow_asked_for:
             node._avow_activate()
         node._avow_all_declared()
-        text = inspect.getsource(sys.modules[made.__module__])
-        if len(driven.groups) > 1 and MultiThreadedExecutor.__name__ in text:
-            driven.refuse("several callback groups, and MultiThreadedExecutor")
         return node
 
     return answers(driven, make)

@@ -25,12 +25,11 @@ INSTEAD = {
     "Node(allow_undeclared_parameters=)": "declare_parameter for each",
     "Node(automatically_declare_parameters_from_overrides=)": "declare_parameter for each",
     "create_timer(clock=)": "create_timer without a clock, which uses the node's",
-    "ReentrantCallbackGroup": "MutuallyExclusiveCallbackGroup, if the callbacks may run one at a time",
     "create_rate": "create_timer",
     "MultiThreadedExecutor": "one callback group, if the callbacks may run one at a time",
     "spin_until_future_complete": "call_async and add_done_callback",
     "Client.call": "call_async and add_done_callback",
-    "coroutine": "a callback without `await`",
+    "coroutine that waits": "call_async and add_done_callback",
     "Rate": "Timer",
     ".sleep": "a timer",
     "ament_index_python": "a path beside the file: pathlib.Path(__file__)",
@@ -60,6 +59,10 @@ class Refusals:
         self.own = own
         """The folders of the class's own modules."""
 
+    def pause(self, nanoseconds: int) -> None:
+        """The running callback sleeps. Refused outside of callbacks."""
+        raise NotImplementedError
+
     def is_own(self, name: str) -> bool:
         """Whether one of the class's own folders has a module or a package of that name."""
         places = [os.path.join(folder, name) for folder in self.own]  # noqa: PTH118
@@ -82,6 +85,8 @@ class Refusals:
         def refusing(name: str, real: Any) -> Any:
             def read(*given: Any, **named: Any) -> Any:
                 if not sys._getframe(1).f_code.co_filename.startswith((library, "<")):
+                    if name == "time.sleep" and self.kind == "rclpy":
+                        return self.pause(int(given[0] * 10**9))
                     raise self.refuse(name)
                 return real(*given, **named)
 

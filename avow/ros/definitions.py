@@ -249,18 +249,16 @@ def _scalar(name: str, package: str) -> Scalar | Nested:
 
 
 _PARTS = {"srv": ("Request", "Response"), "action": ("Goal", "Result", "Feedback")}
+_ANSWERS = {"SendGoal_Response": "bool accepted\nbuiltin_interfaces/Time stamp"}
+_ANSWERS |= {"GetResult_Response": "int8 status\n{0}_Result result"}
+"""The responses of an action's services (https://design.ros2.org/articles/actions.html)."""
 
 
 def parse_parts(text: str, name: str, kind: str, source: str = "") -> tuple[Message, ...]:
     """A ``.srv`` (``package/Type_Request``, ``…_Response``) or ``.action`` text (``…_Goal``, ``…_Result``,
-    ``…_Feedback``). Raises WrongDefinition."""
-    parts: list[list[str]] = [[]]
+    ``…_Feedback``, and the responses of its services). Raises WrongDefinition."""
     lines = text.splitlines()
-    for line in lines:
-        if line.strip() == "---":
-            parts.append([])
-        else:
-            parts[-1].append(line)
+    parts = [part.split("\n")[1:] for part in re.split(r"\n[ \t]*---[ \t]*(?=\n)", "\n".join(["", *lines, ""]))]
     wanted = _PARTS[kind]
     if len(parts) != len(wanted):
         raise WrongDefinition(
@@ -274,7 +272,8 @@ def parse_parts(text: str, name: str, kind: str, source: str = "") -> tuple[Mess
         except WrongDefinition as wrong:
             raise WrongDefinition(str(wrong), wrong.line + before, wrong.hint) from None
         before += len(part) + 1
-    return tuple(found)
+    answers = _ANSWERS if kind == "action" else {}
+    return (*found, *(parse_message(answer.format(name), f"{name}_{end}", source) for end, answer in answers.items()))
 
 
 for _name, _text in (
@@ -282,5 +281,6 @@ for _name, _text in (
     ("std_srvs/SetBool", "bool data\n---\nbool success\nstring message"),
     ("std_srvs/Trigger", "---\nbool success\nstring message"),
     ("lifecycle_msgs/ChangeState", "Transition transition\n---\nbool success"),
+    ("action_msgs/CancelGoal", "GoalInfo goal_info\n---\nint8 return_code\nGoalInfo[] goals_canceling"),
 ):
     STANDARD |= {message.name: message for message in parse_parts(_text, _name, "srv", _name.partition("/")[0])}

@@ -235,7 +235,8 @@ class _Work:
         """A run's counterexample to a guarantee, before any assumption is violated."""
         shown, broken = judged.clauses[name].shown, judged.assumption
         if shown is not None and (broken is None or judged.clauses[name].at <= broken[0]):
-            return replace(shown, explanation=f"guarantee {name} does not hold of these: {shown.explanation}")
+            order = f" (callbacks of one instant: {run.order})" if run.order else ""
+            return replace(shown, explanation=f"guarantee {name} does not hold of these: {shown.explanation}{order}")
         if run.wrong and broken is None:
             return Counterexample((), f"at message {run.after} the class raises {run.wrong}: there is no output")
         return None
@@ -260,7 +261,7 @@ class _Work:
         """The simplest run that violates it, as repeated in a process of its own."""
         name = obligation.name
         for events in (self.smaller(name, self.failing[name]), self.failing[name]):
-            run = self.driver.run(events, 0, _end(events))
+            run = self.driver.run(events, 0, _end(events), orders=True)
             judged = self.judged(events, run)
             shown = self.wrong(name, run, judged)
             if shown is not None:

@@ -227,6 +227,7 @@ def test_a_clock_of_python_and_chance_are_refused_by_name_and_line(tmp_path: Pat
     found = told(drive(folder, "watch", trace(tmp_path)))
     first = text[: text.index("# HERE")].count("\n") + 7
     wanted = [f"{line.partition('(')[0]} (watch.py, line {first + 2 * at})" for at, line in enumerate(CLOCKS)]
+    wanted = [why for why in wanted if kind == "rospy" or not why.startswith("time.sleep")]  # a callback may sleep
     wanted += [f"random.{name} (watch.py, line " for name in ("random", "choice", "gauss")]
     assert [why for why in wanted if why not in found] == [], found
     assert found.count("random.") == 3
@@ -309,7 +310,6 @@ UNSUPPORTED = {  # what of rclpy is used, and what is told besides its name and 
     "self.add_pre_set_parameters_callback(print)": "Node.add_pre_set_parameters_callback (watch.py, line {})",
     "self.create_timer(1.0, print, clock=self.get_clock())": "create_timer(clock=) (watch.py, line {}); instead: ",
     "self.create_timer(1.0, print, autostart=False)": "create_timer(autostart=) (watch.py, line {})",
-    "import rclpy.callback_groups as g; g.ReentrantCallbackGroup()": "CallbackGroup (watch.py, line {}); instead: Mut",
     "Node('other', allow_undeclared_parameters=True)": "parameters=) (watch.py, line {}); instead: declare_parameter",
     "self.create_subscription(String, 's', print, 1, raw=True)": "create_subscription(raw=) (watch.py, line {})",
     "import nav_msgs.msg as _": "the module nav_msgs (watch.py, line {}); instead: its definitions",

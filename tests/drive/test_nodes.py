@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from importlib import import_module
@@ -32,7 +33,7 @@ class Made:
     params: str = ""
     mapping: str = "{}"
     kind: str = "rclpy"
-    cases: int = 300
+    cases: str = "300"
 
 
 def system(folder: Path, made: Made) -> Path:
@@ -329,6 +330,129 @@ class Watch(LifecycleNode):
     def move(self, message):
         self.motor.publish(Float64(data=message.data if self.on else 0.0))
 """
+SPIN = """\
+node watch {
+  inputs( turns : INTEGER )
+  outputs( taken : BOOL, done : INTEGER, sofar : INTEGER, status : INTEGER )
+  topics( mover/Spin_Goal spin matches(in.turns), mover/Spin_Result spin matches(out.done),
+          mover/Spin_Feedback spin matches(out.sofar), action_msgs/CancelGoal_Request spin/_action/cancel_goal,
+          mover/Spin_SendGoal_Response spin/_action/send_goal matches(out.taken),
+          mover/Spin_GetResult_Response spin/_action/get_result matches(out.status) )
+  guarantee taken ( out.taken <=> 0 < in.turns and in.turns <= 3 )
+  guarantee done ( out.done <= in.turns )
+  guarantee bounded ( 1 <= out.sofar and out.sofar <= in.turns )
+  guarantee ended ( out.status == 4 or out.status == 5 )
+}
+"""
+ACTION = """\
+import time
+
+from rclpy.action import ActionServer, CancelResponse, GoalResponse
+from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.executors import MultiThreadedExecutor
+from rclpy.node import Node
+from mover.action import Spin
+
+
+class Watch(Node):
+    def __init__(self):
+        super().__init__("watch")
+        self.server = ActionServer(
+            self,
+            Spin,
+            "spin",
+            execute_callback=self.execute,
+            callback_group=ReentrantCallbackGroup(),
+            goal_callback=self.asked,
+            cancel_callback=lambda handle: CancelResponse.ACCEPT,
+        )
+
+    def asked(self, goal):
+        return GoalResponse.ACCEPT if 0 < goal.turns <= 3 else GoalResponse.REJECT
+
+    async def execute(self, handle):
+        feedback, result = Spin.Feedback(), Spin.Result()
+        for turn in range(handle.request.turns):
+            if handle.is_cancel_requested:
+                handle.canceled()
+                return result
+            feedback.sofar = turn + 1
+            handle.publish_feedback(feedback)
+            time.sleep(0.25)
+            result.done = turn + 1
+        handle.succeed()
+        return result
+"""
+SPUN = """\
+node watch {
+  inputs( turns : INTEGER, taken : BOOL, done : INTEGER, sofar : INTEGER )
+  outputs( asked : INTEGER, shown : INTEGER, near : BOOL )
+  topics( int32 turns matches(in.turns), mover/Spin_Goal spin matches(out.asked),
+          mover/Spin_SendGoal_Response spin/_action/send_goal matches(in.taken),
+          mover/Spin_Result spin matches(in.done), mover/Spin_Feedback spin matches(in.sofar),
+          int32 shown matches(out.shown), bool near matches(out.near) )
+  guarantee bounded ( out.asked <= 3 )
+  guarantee shown ( out.shown == in.done )
+  guarantee near ( out.near <=> in.sofar >= 2 )
+}
+"""
+ORDERS = """\
+from rclpy.action import ActionClient
+from rclpy.node import Node
+from mover.action import Spin
+from std_msgs.msg import Bool, Int32
+
+
+class Watch(Node):
+    def __init__(self):
+        super().__init__("watch")
+        self.shown = self.create_publisher(Int32, "shown", 10)
+        self.near = self.create_publisher(Bool, "near", 10)
+        self.client = ActionClient(self, Spin, "spin")
+        self.client.wait_for_server()
+        self.create_subscription(Int32, "turns", self.heard, 10)
+
+    def heard(self, message):
+        goal = Spin.Goal(turns=min(message.data, 3))
+        self.client.send_goal_async(goal, feedback_callback=self.going).add_done_callback(self.answered)
+
+    def going(self, message):
+        self.near.publish(Bool(data=message.feedback.sofar >= 2))
+
+    def answered(self, future):
+        handle = future.result()
+        if handle.accepted:
+            handle.get_result_async().add_done_callback(self.ended)
+
+    def ended(self, future):
+        self.shown.publish(Int32(data=future.result().result.done))
+"""
+RACING = """\
+from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.executors import MultiThreadedExecutor
+from rclpy.node import Node
+from std_msgs.msg import Float64
+
+
+class Watch(Node):
+    def __init__(self):
+        super().__init__("watch")
+        self.group, self.fastest = ReentrantCallbackGroup(), 1.5
+        self.allowed = self.create_publisher(Float64, "allowed", 10)
+        self.state = self.create_publisher(Float64, "state", 10)
+        self.create_subscription(Float64, "asked", self.heard, 10, callback_group=self.group)
+        self.create_timer(0.1, self.tick, callback_group=self.group)
+
+    def heard(self, message):
+        self.allowed.publish(Float64(data=min(message.data, self.fastest)))
+
+    def tick(self):
+        fastest = 1.25
+        self.state.publish(Float64(data=fastest))
+        self.fastest = 1.5
+"""
+SPINS = {"mover/package.xml": PACKAGE["ws/src/mover/package.xml"]}
+SPINS |= {"mover/action/Spin.action": "int32 turns\n---\nint32 done\n---\nint32 sofar\n"}
 RANGES = "{in.left: range, in.right: range}"
 NEAR = PAIRS.replace("TimeSynchronizer(both, 5)", "ApproximateTimeSynchronizer(both, 5, 0.05)").replace("assert", "#")
 BEGINS = {"a lifecycle node": "active", "transitions": "unconfigured"}
@@ -370,7 +494,33 @@ NODES = {
         {"src/motor.py": MOTOR},
         (("self.on = False\n        self.motor", "self.motor"), ("self.destroy_subscription(self.speed)", "pass")),
         mapping="{in.turn: transition.label, out.turned: success}",
-        cases=1500,
+        cases="1500",
+    ),
+    "a server of an action": Made(
+        SPIN,
+        {"mover/mover/server.py": ACTION, **SPINS},
+        (
+            ("<= 3 else", "<= 4 else"),
+            ("return result\n            feedback", "result.done = 9; return result\n            feedback"),
+            ("turn + 1\n            handle", "turn\n            handle"),
+            ("handle.canceled()", "handle.abort()"),
+        ),
+        mapping="{out.taken: accepted, out.status: status}",
+        options="messages: [mover/action]\n",
+        cases="600, answers: {by: call}",
+    ),
+    "a client of an action": Made(
+        SPUN,
+        {"mover/mover/client.py": ORDERS, **SPINS},
+        (("min(message.data, 3)", "message.data"), ("result.done", "result.done + 1"), (">= 2", ">= 1")),
+        mapping="{in.taken: accepted}",
+        options="messages: [mover/action]\n",
+        cases="900",
+    ),
+    "callbacks that run together": Made(
+        re.sub(".*followed.*\n", "", LIMIT),
+        {"src/racing.py": RACING},
+        (("fastest = 1.25", "fastest = self.fastest = 1.75"),),
     ),
     "a lifecycle node": Made(
         LIMIT,
@@ -414,10 +564,15 @@ def test_an_edit_of_a_module_that_a_node_imports_makes_its_evidence_stale(tmp_pa
 
 
 REFUSED = {  # what is written in the place of a text of a node, and what is told
-    "a coroutine": ("a service", "def move", "async def move", "a callback that is a coroutine; instead: a callback"),
-    "groups in parallel": (
-        *("a service", '"stop", self.stop)', '"stop", self.stop, callback_group=Group())'),
-        "several callback groups, and MultiThreadedExecutor; instead: one callback group",
+    "a coroutine that waits": (
+        "a client of a service",
+        "def heard(self, message):\n        self.gate.call_async(",
+        "async def heard(self, message):\n        await self.gate.call_async(SetBool.Request())\n        (",
+        "a coroutine that waits; instead: call_async and add_done_callback",
+    ),
+    "sleep of a constructor": (
+        *("a service", "self.held = False\n        self.motor", "time.sleep(1.0)\n        self.motor"),
+        "time.sleep (",
     ),
     "another service": ("a service", "SetBool", "Trigger", "subscribes to /stop/_request as std_srvs/Trigger_Request"),
     "no response": ("a service", "return response", "return None", "TypeError: /stop/_response: None is no std_srvs"),
@@ -433,8 +588,7 @@ REFUSED = {  # what is written in the place of a text of a node, and what is tol
 def test_what_a_node_may_not_do_is_told(tmp_path: Path, name: str) -> None:
     node, old, new, why = REFUSED[name]
     files = {path: text.replace(old, new) for path, text in NODES[node].files.items()}
-    first = "from rclpy.callback_groups import MutuallyExclusiveCallbackGroup as Group\n"
-    made = replace(NODES[node], files={path: first + text for path, text in files.items()})
+    made = replace(NODES[node], files={path: f"import time\n{text}" for path, text in files.items()})
     done = drive(system(tmp_path / "w", made), "watch")
     told = " ".join(d.message for d in done.exception.diagnostics) if done.exception else done.output
     assert why in told

@@ -75,6 +75,8 @@ def test_services_and_actions_are_their_parts() -> None:
         "p/Go_Goal",
         "p/Go_Result",
         "p/Go_Feedback",
+        "p/Go_SendGoal_Response",
+        "p/Go_GetResult_Response",
     ]
     with pytest.raises(WrongDefinition, match="2 parts"):
         parse_parts("int32 a", "p/Do", "srv")

@@ -52,6 +52,8 @@ class Event:
     data: Any
     after: int = 0
     """How many messages had been delivered: for a message with itself, in `Run.beside`."""
+    call: str = ""
+    """The call of which it is a part, if it is known."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,6 +73,12 @@ class Run:
     """Topics whose messages it takes together, by their stamps."""
     dropped: Sequence[int] = ()
     """The messages that did not reach it, by their numbers: responses to no request."""
+    calls: Sequence[str] = ()
+    """For each message the call of its own that it answers."""
+    taken: Sequence[int] = ()
+    """The messages by their numbers, in the order in which the node took them."""
+    order: str = ""
+    """In which order the callbacks of one instant ran; none: as they came."""
 
     @property
     def raised(self) -> tuple[str, ...]:
@@ -80,10 +88,10 @@ class Run:
 
     def beside(self, heard: Sequence[Event]) -> Iterator[Event]:
         """Messages received and published, in order of occurrence."""
-        for number in range(len(heard) + 1):
+        for position, number in enumerate((0, *self.taken)):
             if number and number not in self.dropped:
-                yield replace(heard[number - 1], after=number)
-            yield from (event for event in self.said if event.after == number)
+                yield replace(heard[number - 1], after=number, call=self.calls[number])
+            yield from (event for event in self.said if event.after == position)
 
 
 Given = tuple[tuple[Event, ...], int, int]
@@ -114,18 +122,19 @@ class Driver:
         """The topics on which other nodes publish to it: it receives its own publications without help."""
         return frozenset(self.topics.heard) - frozenset(self.topics.spoken)
 
-    def run(self, events: Iterable[Event], start: int, end: int) -> Run:
+    def run(self, events: Iterable[Event], start: int, end: int, *, orders: bool = False) -> Run:
         """Runs the class twice, in separate processes. Raises Rejected if the class uses a part of ROS that is not
         supported, if the two runs differ, or if the result depends on inputs that no recording has."""
         given = [(tuple(events), start, end)]
-        first, second = (_runs(self.source, self.subject, given)[0] for _ in range(2))
+        first, second = (_runs(self.source, self.subject, given, orders=orders)[0] for _ in range(2))
         if first != second:
             raise _refused(self.source, f"{self.source.class_name} publishes otherwise when it is run again")
         return first[0]
 
     def runs(self, given: Sequence[Given]) -> tuple[tuple[Run, ...], Told]:
-        """Runs with a new object each, in one process; also returns its isolation. Raises Rejected likewise."""
-        return _runs(self.source, self.subject, given)
+        """Runs with a new object each, in one process, each in one of the possible orders of its callbacks; also
+        returns its isolation. Raises Rejected likewise."""
+        return _runs(self.source, self.subject, given, orders=True)
 
     def fits(self) -> Iterator[Diagnostic]:
         """Topics of the contract that the class does not use, or uses with other message types."""
@@ -160,7 +169,7 @@ class Driver:
         """A message's fields as a recording has them. A service answers a request before the next message."""
         kind = self.topics.heard.get(event.topic) or self.topics.spoken[event.topic]
         found: dict[str, Any] = shown(Nested(kind), event.data, self.known, self.source.kind)
-        return found | ({CALL: str(event.after)} if is_part(event.topic) else {})
+        return found | ({CALL: event.call or str(event.after)} if is_part(event.topic) else {})
 
     def generated(self, messages: int, seed: int | str) -> Iterator[Event]:
         """So many messages on its subscriptions, made from the numbers and words of contract, program and
@@ -168,11 +177,8 @@ class Driver:
         chance = random.Random(seed)
         topics = sorted(self.inputs)
         clauses = (*self.node.assumptions, *self.node.guarantees)
-        numbers = (
-            numbers_of(clause.formula for clause in clauses)
-            | set(written(self.text))
-            | set(leaves(self.subject.params))
-        )
+        numbers = numbers_of(clause.formula for clause in clauses)
+        numbers = numbers | set(written(self.text)) | set(leaves(self.subject.params))
         words = sorted({word for port in (*self.node.inputs, *self.node.outputs) for word in _words(port.sort)})
         drawing = _Drawing(pool(numbers), words, self.known, chance)
         at = 0  # nanoseconds
@@ -184,8 +190,7 @@ class Driver:
                 others = [topic for topic in alike.get(due[0], ()) if topic in self.inputs and topic != due[0]]
                 due += others if others and chance.random() > NUMBERS_AGAIN else ()
                 at += drawing.gap()
-            topic = due.pop()
-            kind = self.topics.heard[topic]
+            kind = self.topics.heard[topic := due.pop()]
             made = drawing.message(Nested(kind), at)
             before = drawing.made.setdefault(kind, [])
             made = _with_floats(made, chance.choice(before)) if before and chance.random() < NUMBERS_AGAIN else made
@@ -240,11 +245,11 @@ def driver(system: System, name: str) -> Driver:
 
 
 def _runs(
-    source: Source, subject: Subject, given: Sequence[Given], *, quiet: bool = False
+    source: Source, subject: Subject, given: Sequence[Given], *, quiet: bool = False, orders: bool = False
 ) -> tuple[tuple[Run, ...], Told]:
     """Runs in a separate process. `quiet`: only subscriptions and publications."""
     asked = [
-        json.dumps({"start": start, "end": end, "events": [[e.topic, e.at, e.data] for e in events]})
+        json.dumps({"start": start, "end": end, "orders": orders, "events": [[e.topic, e.at, e.data] for e in events]})
         for events, start, end in given
     ]
     try:
@@ -255,13 +260,12 @@ def _runs(
         raise _refused(source, answer.fault, Silent)
     if answer.fault or len(answer.replies) != len(asked):
         raise _refused(source, answer.fault or "there is no answer")
-    refused = dict.fromkeys(why for reply in answer.replies for why in reply.pop("refused"))
-    if refused:
+    if refused := dict.fromkeys(why for reply in answer.replies for why in reply.pop("refused")):
         raise _refused(source, f"{source.class_name} asks for what is not driven: {', '.join(refused)}")
-    outside = [seen.path for seen in answer.observed if seen.kind is Seen.OUTSIDE]
-    if outside and not quiet:
-        text = f"what {source.class_name} publishes hangs on what no recording has: {', '.join(outside)}"
-        raise _refused(source, text)
+    if not quiet and (outside := [seen.path for seen in answer.observed if seen.kind is Seen.OUTSIDE]):
+        raise _refused(
+            source, f"what {source.class_name} publishes hangs on what no recording has: {', '.join(outside)}"
+        )
     return tuple(_made(reply) for reply in answer.replies), answer
 
 
@@ -296,6 +300,7 @@ def _messages(node: Node, package: Path, known: Definitions, kind: Driving, dist
     files = sorted(found for depth in ("*.py", "*/*.py", "*/*/*.py") for found in package.glob(depth))
     text = "".join(read_text(path, "utf-8", errors="replace") for path in files)
     wanted = [canonical(topic.ros_type) for topic in node.topics]
+    wanted += [f"{name.removesuffix('_Request')}_Response" for name in wanted if name.endswith("_Request")]
     wanted += [name for name in known.messages if name.partition("/")[0] in text]
     found: dict[str, Any] = {}
     if kind is Driving.RCLPY:

@@ -1,0 +1,295 @@
+"""rclpy.action: servers and clients of actions (https://design.ros2.org/articles/actions.html).
+
+A goal is a message on ``/spin/_goal``, its feedback on ``/spin/_feedback``, its result on ``/spin/_result``. The
+services of an action are topics only if the contract has them: ``/spin/_action/send_goal/_response`` tells whether a
+goal is accepted, ``/spin/_action/get_result/_response`` a result with its status, and a client's
+``/spin/_action/cancel_goal/_request`` asks a server to cancel.
+"""
+
+from __future__ import annotations
+
+import enum
+import types
+from typing import Any
+
+from .callbacks import ACTION
+from .nodes import Future
+from .refusals import Strict
+from .turns import FREE
+
+SECOND = 10**9
+SENT, TOLD, CANCEL = "_SendGoal_Response", "_GetResult_Response", "action_msgs/CancelGoal"
+
+
+class GoalResponse(enum.Enum):
+    REJECT, ACCEPT = 1, 2
+
+
+class CancelResponse(enum.Enum):
+    REJECT, ACCEPT = 1, 2
+
+
+class GoalStatus(enum.IntEnum):
+    """The values of action_msgs/GoalStatus."""
+
+    UNKNOWN, ACCEPTED, EXECUTING, CANCELING, SUCCEEDED, CANCELED, ABORTED = range(7)
+
+
+class RCLError(RuntimeError):
+    """A transition that a goal's state does not allow."""
+
+
+ACTIVE = (GoalStatus.ACCEPTED, GoalStatus.EXECUTING, GoalStatus.CANCELING)
+RUNNING = (GoalStatus.EXECUTING, GoalStatus.CANCELING)
+LEADS = {
+    GoalStatus.EXECUTING: ACTIVE[:1],
+    GoalStatus.CANCELING: ACTIVE[:2],
+    GoalStatus.SUCCEEDED: RUNNING,
+    GoalStatus.ABORTED: RUNNING,
+    GoalStatus.CANCELED: RUNNING[1:],
+}
+"""State of a goal → the states before it."""
+
+
+class _Action(Strict):
+    """The topics of an action."""
+
+    def __init__(self, called: str, node: Any, action_type: Any, action_name: str, more: dict[str, Any]) -> None:
+        for name in [name for name in more if name.endswith("_qos_profile")]:
+            node._avow_plain(called, {}, more.pop(name), object)
+        group = more.get("callback_group")
+        node._avow_plain(called, more, 0)
+        driven = self._driven
+        if action_type not in driven.services:
+            raise TypeError(f"{action_type!r} is no action class")
+        self.action, self.kind, self.group = action_type, driven.services[action_type], group
+        self.name = driven.whole(action_name)
+        self.goal, self.result, self.feedback = (f"{self.name}/{end.lower()}" for end in ACTION)
+        own = f"{self.name}/_action"
+        self.sent, self.told, self.cancel = (
+            f"{own}/send_goal/_response",
+            f"{own}/get_result/_response",
+            f"{own}/cancel_goal",
+        )
+
+    def destroy(self) -> None:
+        raise self._driven.refuse(f"{self._called}.destroy")
+
+
+class ServerGoalHandle(Strict):
+    _called = "rclpy.action.server.ServerGoalHandle"
+
+    def __init__(self, server: ActionServer, request: Any, call: str, number: int) -> None:
+        self.request, self.call, self._server = request, call, server
+        self.goal_id = types.SimpleNamespace(uuid=list(number.to_bytes(16, "big")))
+        self.status = GoalStatus.ACCEPTED
+        self.stamp = self._driven.now
+
+    @property
+    def is_active(self) -> bool:
+        return self.status in ACTIVE
+
+    @property
+    def is_cancel_requested(self) -> bool:
+        return self.status is GoalStatus.CANCELING
+
+    def _go(self, status: GoalStatus) -> None:
+        if self.status not in LEADS[status]:
+            raise RCLError(f"a goal that is {self.status.name} cannot become {status.name}")
+        self.status = status
+
+    def execute(self, execute_callback: Any = None) -> None:
+        if not self.is_cancel_requested:
+            self._go(GoalStatus.EXECUTING)
+        self._server.notify_execute(self, execute_callback)
+
+    def publish_feedback(self, feedback: Any) -> None:
+        if type(feedback) is not self._server.action.Feedback:
+            raise TypeError(f"{feedback!r} is no {self._server.kind}.Feedback")
+        if self.is_active:
+            self._driven.say(self._server.feedback, feedback, self.call)
+
+    def succeed(self, response: Any = None) -> None:
+        self._end(GoalStatus.SUCCEEDED, response)
+
+    def abort(self, response: Any = None) -> None:
+        self._end(GoalStatus.ABORTED, response)
+
+    def canceled(self, response: Any = None) -> None:
+        self._end(GoalStatus.CANCELED, response)
+
+    def _end(self, status: GoalStatus, response: Any) -> None:
+        self._go(status)
+        if response is not None:
+            self._server.answer(self, response)
+
+    def destroy(self) -> None:
+        """It is kept until its result is sent."""
+
+
+class ActionServer(_Action):
+    _called = "rclpy.action.ActionServer"
+
+    def __init__(
+        self,
+        node: Any,
+        action_type: Any,
+        action_name: str,
+        execute_callback: Any,
+        *,
+        goal_callback: Any = lambda goal: GoalResponse.ACCEPT,
+        handle_accepted_callback: Any = lambda handle: handle.execute(),
+        cancel_callback: Any = lambda handle: CancelResponse.REJECT,
+        result_timeout: float = 900,
+        **more: Any,
+    ) -> None:
+        super().__init__("ActionServer", node, action_type, action_name, more)
+        driven = self._driven
+        if not callable(execute_callback):
+            raise TypeError("Failed to register goal execution callback: not callable")
+        self.handles: list[ServerGoalHandle] = []
+        self.ended: set[str] = set()
+        self.on_goal, self.on_accepted, self.on_cancel = goal_callback, handle_accepted_callback, cancel_callback
+        self.on_execute = execute_callback
+        driven.spoken |= {self.result: f"{self.kind}_Result", self.feedback: f"{self.kind}_Feedback"}
+        more_topics = {self.sent: f"{self.kind}{SENT}", self.told: f"{self.kind}{TOLD}"}
+        driven.spoken |= {topic: kind for topic, kind in more_topics.items() if topic in driven.topics}
+        if self.goal in driven.heard:
+            raise TypeError(f"{self.name} has two servers")
+        act = driven.turn(self.group, self.requested)
+        driven.heard[self.goal] = (
+            (f"{self.kind}_Goal", lambda goal: act(goal, str(driven.number or driven.new_call()))),
+        )
+        if f"{self.cancel}/_request" in driven.topics:
+            service = next(kind for kind, name in driven.services.items() if name == CANCEL)
+            driven.serve(self.cancel, service, lambda request: self.canceled(service, request), self.group)
+
+    def register_goal_callback(self, goal_callback: Any) -> None:
+        self.on_goal = goal_callback
+
+    def register_handle_accepted_callback(self, handle_accepted_callback: Any) -> None:
+        self.on_accepted = handle_accepted_callback
+
+    def register_cancel_callback(self, cancel_callback: Any) -> None:
+        self.on_cancel = cancel_callback
+
+    def register_execute_callback(self, execute_callback: Any) -> None:
+        self.on_execute = execute_callback
+
+    def requested(self, goal: Any, call: str) -> None:
+        accepted = self._driven.call(self.on_goal, goal) is GoalResponse.ACCEPT
+        if self.sent in self._driven.topics:
+            made = self._driven.classes[f"{self.kind}{SENT}"](accepted=accepted)
+            if accepted:
+                made.stamp = self._driven.moment("time", self._driven.now)
+            self._driven.say(self.sent, made, call)
+        if accepted:
+            self.handles.append(ServerGoalHandle(self, goal, call, len(self.handles) + 1))
+            self._driven.call(self.on_accepted, self.handles[-1])
+
+    def notify_execute(self, handle: ServerGoalHandle, execute_callback: Any) -> None:
+        async def execute() -> None:
+            result = (execute_callback or self.on_execute)(handle)
+            result = await result if hasattr(result, "__await__") else result
+            if handle.is_active:
+                handle.abort()
+            self.answer(handle, result)
+
+        driven = self._driven
+        driven.later(driven.now, driven.turn(FREE, lambda: driven.call(execute, free=True)))
+
+    def answer(self, handle: ServerGoalHandle, result: Any) -> None:
+        """The result of a goal, once. An exception of the class, for which rclpy sends a default, is raised."""
+        if handle.call in self.ended:
+            return
+        if type(result) is not self.action.Result:
+            raise TypeError(f"the result of a goal is {result!r}, and no {self.kind}.Result")
+        self.ended.add(handle.call)
+        driven = self._driven
+        if self.told in driven.topics:
+            made = driven.classes[f"{self.kind}{TOLD}"](status=int(handle.status), result=result)
+            driven.say(self.told, made, handle.call)
+        driven.say(self.result, result, handle.call)
+
+    def canceled(self, service: Any, request: Any) -> Any:
+        """The response to a request to cancel: of a goal, of all up to a time, of all."""
+        wanted, stamp = list(request.goal_info.goal_id.uuid), self._driven.nanoseconds("time", request.goal_info.stamp)
+        every = not any(wanted) and not stamp
+        known = [h for h in self.handles if every or h.goal_id.uuid == wanted or (stamp and h.stamp <= stamp)]
+        response = service.Response()
+        if any(wanted) and not any(h.goal_id.uuid == wanted for h in self.handles):
+            response.return_code = 2  # no such goal
+        elif any(wanted) and not any(h.is_active for h in known):
+            response.return_code = 3  # it has ended
+        for handle in [h for h in known if h.status in LEADS[GoalStatus.CANCELING]]:
+            accepted = self._driven.call(self.on_cancel, handle) is CancelResponse.ACCEPT
+            if accepted and handle.status in LEADS[GoalStatus.CANCELING]:
+                handle._go(GoalStatus.CANCELING)
+                info = self._driven.classes["action_msgs/GoalInfo"]()
+                info.goal_id.uuid, info.stamp = handle.goal_id.uuid, self._driven.moment("time", handle.stamp)
+                response.goals_canceling = [*response.goals_canceling, info]
+        if known and not response.goals_canceling and not response.return_code:
+            response.return_code = 1  # rejected
+        return response
+
+
+class ClientGoalHandle(Strict):
+    _called = "rclpy.action.client.ClientGoalHandle"
+
+    def __init__(self, client: ActionClient, accepted: bool, result: Future) -> None:
+        self.accepted, self._client, self._result = accepted, client, result
+
+    def get_result_async(self) -> Future:
+        return self._result
+
+
+class ActionClient(_Action):
+    _called = "rclpy.action.ActionClient"
+
+    def __init__(self, node: Any, action_type: Any, action_name: str, **more: Any) -> None:
+        super().__init__("ActionClient", node, action_type, action_name, more)
+        driven = self._driven
+        driven.spoken[self.goal] = f"{self.kind}_Goal"
+        driven.await_on(self.sent, f"{self.kind}{SENT}")
+        driven.await_on(self.feedback, f"{self.kind}_Feedback", last=False)
+        self.whole = self.told in driven.topics
+        driven.await_on(*((self.told, f"{self.kind}{TOLD}") if self.whole else (self.result, f"{self.kind}_Result")))
+
+    def wait_for_server(self, timeout_sec: Any = None) -> bool:
+        return True
+
+    def server_is_ready(self) -> bool:
+        return True
+
+    def send_goal_async(self, goal: Any, feedback_callback: Any = None, goal_uuid: Any = None) -> Future:
+        driven, sent, result, call = self._driven, Future(), Future(), self._driven.new_call()
+
+        def wait(topic: str, act: Any) -> None:
+            driven.waiting[topic] = (*driven.waiting.get(topic, ()), (call, act))
+
+        def heard(feedback: Any) -> None:
+            if feedback_callback is not None:
+                made = types.SimpleNamespace(goal_id=goal_uuid, feedback=feedback)
+                driven.turn(self.group, lambda: driven.call(feedback_callback, made))()
+
+        def ended(message: Any) -> None:
+            driven.waiting[self.feedback] = tuple(each for each in driven.waiting[self.feedback] if each[0] != call)
+            status = int(GoalStatus.SUCCEEDED)
+            result.set_result(message if self.whole else types.SimpleNamespace(status=status, result=message))
+
+        def answered(response: Any) -> None:
+            sent.set_result(ClientGoalHandle(self, response.accepted, result))
+            if response.accepted:
+                wait(self.feedback, heard)
+                wait(self.told if self.whole else self.result, ended)
+
+        if type(goal) is not self.action.Goal:
+            raise TypeError(f"{goal!r} is no {self.kind}.Goal")
+        wait(self.sent, answered)
+        driven.say(self.goal, goal, call)
+        return sent
+
+
+KINDS: tuple[Any, ...] = (ActionServer, ActionClient, GoalResponse, CancelResponse)
+CONTENT: dict[str, Any] = {kind.__name__: kind for kind in KINDS}
+CONTENT |= {"server": types.SimpleNamespace(), "client": types.SimpleNamespace()}
