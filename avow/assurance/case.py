@@ -46,7 +46,7 @@ from avow.assurance.facts import Facts, facts_of_case
 from avow.assurance.findings import handle
 from avow.assurance.first_screen import answers, weakest_of, with_signature
 from avow.assurance.gap import independent, missing_tools
-from avow.assurance.gates import exit_code, gates, suggestion_for
+from avow.assurance.gates import exit_code, gates, grants, suggestion_for
 from avow.assurance.mitigated import hazard_views
 from avow.assurance.model import (
     Case,
@@ -77,7 +77,7 @@ from avow.assurance.support import (
 from avow.assurance.trust import trust_lines
 from avow.base.plain import count
 from avow.base.verdict import Link, Verdict
-from avow.evidence.claims import Standing, judge
+from avow.evidence.claims import Claim, Standing, judge
 from avow.evidence.ledger import Entry
 from avow.evidence.obligation import Kind, Obligation
 from avow.evidence.record import OUTPUT_FOR_EVERY_INPUT, Evidence
@@ -122,6 +122,7 @@ def conclude(facts: Facts) -> Case:
     claims += [requirement_claim_of(r, names, statuses) for r in facts.requirements]
     claims += derivation_claims(facts, names)
     standings = judge(claims)
+    granted = _granted(claims, standings, facts)
     rests = {claim.id: claim.rests_on for claim in claims}
     handled = {name: f.how for f in findings if not f.expired for name in f.obligations}
     views = tuple(
@@ -147,7 +148,7 @@ def conclude(facts: Facts) -> Case:
     proofs = proof_views(views, facts.kernel, facts.run.id)
     grade, reason = _grade(facts, proofs)
     hazards = hazard_views(facts.hazards, requirements, by_id, relied, closure, supposed, facts.nodes, said.judge)
-    found = gates(facts, views, requirements, derived, hazards, findings, proofs, relied, fresh)
+    found = gates(facts, views, requirements, derived, hazards, findings, proofs, relied, fresh, granted)
     standard = None
     if facts.policy.standard:
         standard = standard_view(facts.policy.standard, facts.policy.level, found, requirements, views, hazards)
@@ -236,6 +237,20 @@ def conclude(facts: Facts) -> Case:
         history=facts.history,
     )
     return replace(case, answers=with_signature(case))
+
+
+def _granted(claims: Sequence[Claim], standings: Mapping[str, Standing], facts: Facts) -> Mapping[str, Standing]:
+    """The standings if the assumptions that the policy accepts were shown: conditions of the composition with a
+    person's reason, and what a person took as a risk."""
+    if not grants(facts.policy):
+        return standings
+    conditions = {o.id for o in facts.obligations if o.kind is Kind.COMPOSITION}
+    return judge(
+        replace(claim, own=Status.PROVED)
+        if claim.own is Status.JUSTIFIED and (claim.id in conditions or claim.id.startswith("assumption:"))
+        else claim
+        for claim in claims
+    )
 
 
 def _evidence(facts: Facts) -> tuple[dict[str, tuple[EvidenceView, ...]], tuple[Entry, ...]]:

@@ -26,17 +26,7 @@ def shortfall(view: ObligationView, demand: Demand, policy: Policy, today: date)
     """What a guarantee lacks, in words; None if the demand is met."""
     if not demand.one_of:
         return None
-    evidence = view.records
-    kept, dropped = [], []
-    persons = _persons(evidence, demand, policy, today)
-    for item in evidence:
-        reason = _disregarded(item, demand, policy, today)
-        if reason is None and effective(item) is Verdict.REVIEWED and len(persons) < demand.reviewers > 1:
-            reason = f"reviewed by {len(persons)}, {demand.reviewers} reviewers are asked{_taken_for_one(persons)}"
-        if reason is None:
-            kept.append(item)
-        elif weigh(item).support is not None:
-            dropped.append(f"{item.method}: {reason}")
+    kept, dropped = counted(view, demand, policy, today)
     status = join(map(weigh, kept)).status if kept else view.status
     because = f" ({'; '.join(dropped)})" if dropped else ""
     if kept == [] and dropped:
@@ -50,6 +40,22 @@ def shortfall(view: ObligationView, demand: Demand, policy: Policy, today: date)
         return f"{count(number, kind)}, but {demand.methods} are asked{because}"
     # that another method answered does not make good what this one could not do
     return next((f"{one.method} failed: {one.summary}" for one in kept if one.verdict is Verdict.ERROR), None)
+
+
+def counted(view: ObligationView, demand: Demand, policy: Policy, today: date) -> tuple[list[Evidence], list[str]]:
+    """The records that count for a demand, and why others, which support the claim, do not."""
+    evidence = view.records
+    kept, dropped = [], []
+    persons = _persons(evidence, demand, policy, today)
+    for item in evidence:
+        reason = _disregarded(item, demand, policy, today)
+        if reason is None and effective(item) is Verdict.REVIEWED and len(persons) < demand.reviewers > 1:
+            reason = f"reviewed by {len(persons)}, {demand.reviewers} reviewers are asked{_taken_for_one(persons)}"
+        if reason is None:
+            kept.append(item)
+        elif weigh(item).support is not None:
+            dropped.append(f"{item.method}: {reason}")
+    return kept, dropped
 
 
 def independent(evidence: Iterable[Evidence]) -> int:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
 from datetime import date
 from typing import assert_never
 
@@ -10,18 +12,18 @@ from avow.assurance.answers import EARLIER
 from avow.assurance.certification import ProofView, certifiable, claimed
 from avow.assurance.facts import Facts
 from avow.assurance.findings import FINDINGS
-from avow.assurance.gap import shortfall, suggest
+from avow.assurance.gap import counted, shortfall, suggest
 from avow.assurance.hazards import HazardView
 from avow.assurance.model import DerivationView, Gate, Handled, ObligationView, RequirementView, Suggestion
 from avow.assurance.naming import derivation_claim, requirement_claim, short
-from avow.assurance.policy import CRITICALITIES
-from avow.assurance.rates import exceeds, percent
+from avow.assurance.policy import Demand, Policy
 from avow.assurance.relied import Relied, looked_at
-from avow.assurance.risk_gates import hazards_gate
+from avow.assurance.risk_gates import hazards_gate, rates_gate
 from avow.base.plain import count, listed
 from avow.base.verdict import Object
+from avow.evidence.claims import Standing
 from avow.evidence.obligation import Kind, ProgramClaim
-from avow.evidence.status import Status
+from avow.evidence.status import Status, weigh
 
 _TOOL = frozenset({Status.ERROR, Status.NOT_RUN})
 
@@ -36,14 +38,16 @@ def gates(
     proofs: Sequence[ProofView],
     relied: Mapping[str, Relied],
     fresh: bool,
+    granted: Mapping[str, Standing],
 ) -> tuple[Gate, ...]:
-    """Every gate, in the order in which a reader should look at them."""
+    """Every gate, in the order in which a reader should look at them. `granted`: the standings of claims without the
+    assumptions that the policy accepts."""
     views = {view.id: view for view in obligations}
     excused = {name for f in findings if not f.expired for name in f.obligations}
     unwritten = [view for view in obligations if view.status is Status.UNWRITTEN]
     behind = _behind(derivations, views, {view.id for view in unwritten} - excused)
     claims = [view for view in obligations if not view.advice and view.id not in behind]
-    return (
+    found = (
         *_earlier(facts),
         _integrity(facts),
         *_findings(facts, findings, obligations),
@@ -60,11 +64,29 @@ def gates(
         *_guarantees(facts, obligations, excused),
         *_programs(facts, obligations, relied, excused),
         _derivations(facts, derivations, views, excused, {view.id for view in unwritten} | behind),
-        _requirements(facts, requirements, derivations, views, excused),
+        _requirements(facts, requirements, derivations, views, excused, granted),
         *hazards_gate(hazards),
-        *_rates(facts, requirements, views),
+        *rates_gate(facts.policy, requirements, views),
         *_certified(facts, proofs, fresh),
     )
+    return tuple(
+        gate
+        if gate.passed or gate.suggestions
+        else replace(gate, suggestions=(Suggestion(_NEXT.get(gate.id, _EVIDENCE)),))
+        for gate in found
+    )
+
+
+_EVIDENCE = "give each claim that fails, and what it rests on, the evidence that is asked"
+_NEXT = {
+    "earlier": "repair what `avow check` reports, then verify again",
+    "expected": "find out why the findings differ, then repair the system or correct `expected:` in the plan",
+    "accepted": "repair the finding, or let a named person accept it again under `accepted:`, with a new date",
+    "refuted": "repair what the findings show, or accept them under `accepted:`, with a name, a date and an expiry",
+    "proved": "run `avow verify`: the kernel then checks the proofs; what it cannot check, prove in smaller steps",
+    "certified": "run `avow verify --fresh`",
+}
+"""The next step if no claim of a gate that fails has one of its own."""
 
 
 def _worded(view: ObligationView) -> str:
@@ -210,10 +232,20 @@ def _guarantees(facts: Facts, obligations: Sequence[ObligationView], excused: se
             failing,
             excused,
             lambda view, lacking=lacking: lacking[view.id] or "",  # type: ignore[misc]
-            _holding([v.status.supports for v in of_kind], asked=bool(demand.one_of)),
+            _holding([v.status.supports for v in of_kind], asked=bool(demand.one_of)) + _kinds(of_kind, demand, facts),
             demand.text() if demand.one_of else "",
             idle=not demand.one_of,
         )
+
+
+def _kinds(views: Sequence[ObligationView], demand: Demand, facts: Facts) -> str:
+    """Which kinds of support count, if several methods are asked: ``: 2 proved and monitored, 1 proved and tested``."""
+    if demand.methods < 2:
+        return ""
+    kept = [counted(view, demand, facts.policy, facts.today)[0] for view in views]
+    found = [{status for r in records if (status := weigh(r).support)} for records in kept]
+    kinds = Counter(" and ".join(s.value for s in Status if s in of) for of in found if of)
+    return ": " + ", ".join(f"{many} {kind}" for kind, many in kinds.items())
 
 
 def _programs(
@@ -258,7 +290,7 @@ def _derivations(
         not bad,
         reason or holding,
         names,
-        (),
+        _steps(s for d in bad for name in d.below if name in views for s in _suggestion(views[name])),
         let_off,
         "",
         bool(bad) and all(_tool_only(d.below, views) for d in bad),
@@ -272,16 +304,21 @@ def _requirements(
     derivations: Sequence[DerivationView],
     views: Mapping[str, ObligationView],
     excused: set[str],
+    granted: Mapping[str, Standing],
 ) -> Gate:
     good = facts.policy.requirements
-    failing = [r for r in requirements if good and (r.status not in good or not (r.level.holds or r.awaits_validation))]
-    causes = {r.id: r.below or r.failing or _weak(r, derivations, views, good) for r in failing}
+    status = {r.id: granted[requirement_claim(r.id)].status for r in requirements}
+    failing = [
+        r for r in requirements if good and (status[r.id] not in good or not (r.level.holds or r.awaits_validation))
+    ]
+    causes = {r.id: r.below or r.failing or _weak(r, derivations, views, facts.policy) for r in failing}
     # a finding below does not excuse a fault of the requirement itself
     own = {r.id for r in failing if r.outdated or r.unknown_names}
     bad = [r for r in failing if r.id in own or not _all_excused(causes[r.id], excused)]
     let_off = tuple(requirement_claim(r.id) for r in failing if r not in bad)
     reason = "; ".join(
-        f"{r.id} is {_standing(r, good)}{f': {_because(causes[r.id])}' if causes[r.id] else ''}" for r in bad[:5]
+        f"{r.id} is {_standing(r, status[r.id], good)}{f': {_because(causes[r.id])}' if causes[r.id] else ''}"
+        for r in bad[:5]
     )
     found = [s for r in bad for name in causes[r.id] if name in views for s in _suggestion(views[name])]
     if any(r.outdated for r in bad):
@@ -290,58 +327,36 @@ def _requirements(
         found.append(
             Suggestion("state the requirement as a `formula` or a `temporal` one: prose is argued by a person", cost=20)
         )
-    suggestions = {s.text: s for s in sorted(found, key=lambda s: (s.cost, s.text))}
     return Gate(
         "requirements",
         "Every requirement is answered",
         not bad,
         reason or _holding([r.level.holds for r in requirements], bool(good), len(let_off)),
         tuple(requirement_claim(r.id) for r in bad),
-        tuple(suggestions.values())[:10],
+        _steps(found),
         let_off,
-        _in_words(good),
+        _in_words(good) + (_GRANTED if grants(facts.policy) else ""),
         bool(bad) and all(_tool_only(r.below, views) for r in bad),
         idle=not good,
     )
 
 
-def _rates(
-    facts: Facts, requirements: Sequence[RequirementView], views: Mapping[str, ObligationView]
-) -> Iterable[Gate]:
-    """A gate: a requirement that rests on samples fails no more often than the policy allows for the most critical node
-    below it."""
-    allowed = dict(facts.policy.max_failure_rate)
-    if not allowed:
-        return
-    wrong = dict[str, str]()
-    asked = 0
-    for r in requirements:
-        below = {views[name].criticality for name in r.closure if views[name].obligation.kind is Kind.GUARANTEE}
-        highest = min((CRITICALITIES.index(c) for c in below if c in CRITICALITIES), default=0)
-        most = min((allowed[c] for c in CRITICALITIES[highest:] if c in allowed), key=float, default=None)
-        if r.rate is not None and most is not None:
-            asked += 1
-            if why := exceeds(r.rate, most):
-                wrong[r.id] = why
-    yield Gate(
-        "rates",
-        "Requirements that rest on samples fail rarely enough",
-        not wrong,
-        "; ".join(f"{name}: {why}" for name, why in wrong.items()) or f"{count(asked, 'requirement')} within the limit",
-        tuple(requirement_claim(name) for name in wrong),
-        (Suggestion("make more trials, or ask each sample for more confidence", cost=30),) if wrong else (),
-        asks=", ".join(f"at most {percent(rate)} at {criticality}" for criticality, rate in allowed.items()),
-        idle=not asked,
-    )
+_GRANTED = ", beside the assumptions that the composition's gate accepts"
 
 
-def _standing(requirement: RequirementView, good: Sequence[Status]) -> str:
+def grants(policy: Policy) -> bool:
+    """Whether a person's reason is accepted for a condition of the composition, but is no evidence of a requirement."""
+    good, reason = policy.requirements, Status.JUSTIFIED
+    return bool(good) and reason not in good and reason in policy.composition
+
+
+def _standing(requirement: RequirementView, status: Status, good: Sequence[Status]) -> str:
     """The reason why it does not count; one that would hold by its own evidence may still rest on what has failed or
     expired."""
     if requirement.outdated:
         return "not validated: its sentence, formula or support was changed since a person read them"
-    if requirement.status not in good:
-        return _short_of(requirement.status, good)
+    if status not in good:
+        return _short_of(status, good)
     return "open" if requirement.failing else "open: an assumption has expired"
 
 
@@ -349,10 +364,11 @@ def _weak(
     requirement: RequirementView,
     derivations: Sequence[DerivationView],
     views: Mapping[str, ObligationView],
-    good: Sequence[Status],
+    policy: Policy,
 ) -> tuple[str, ...]:
     """The claims that make a requirement weaker than is asked: all below it that are themselves weaker than is asked.
     Empty if the requirement is only prose: no finding below it can excuse that."""
+    good = policy.requirements
     if not (requirement.formula or requirement.temporal) and Status.ARGUED not in good:
         return ()
     rests = {derivation_claim(d.derivation.name): d.rests_on for d in derivations}
@@ -364,7 +380,8 @@ def _weak(
         seen.add(name)
         view = views.get(name)
         todo += view.rests_on if view else rests.get(name, ())
-        if view is not None and view.status not in good:
+        conditions = policy.composition if view and view.obligation.kind is Kind.COMPOSITION else ()
+        if view is not None and view.status not in (*good, *conditions):
             found.append(name)
     return tuple(found)
 
@@ -406,14 +423,13 @@ def _gate(
         reason = f"{good}; {count(len(let_off), 'finding')} excused by the plan"
     else:
         reason = good
-    suggestions = {s.text: s for view in bad for s in _suggestion(view)}
     return Gate(
         name,
         title,
         not bad,
         reason,
         tuple(view.id for view in bad),
-        tuple(sorted(suggestions.values(), key=lambda s: (s.cost, s.text)))[:10],
+        _steps(s for view in bad for s in _suggestion(view)),
         let_off,
         asks,
         bool(bad) and all(view.status in _TOOL for view in bad),
@@ -433,6 +449,11 @@ def _holding(supported: Sequence[bool], asked: bool, excused: int = 0) -> str:
 
 def _suggestion(view: ObligationView) -> tuple[Suggestion, ...]:
     return (view.suggestion,) if view.suggestion else ()
+
+
+def _steps(found: Iterable[Suggestion]) -> tuple[Suggestion, ...]:
+    """At most ten, the cheapest first."""
+    return tuple({s.text: s for s in sorted(found, key=lambda s: (s.cost, s.text))}.values())[:10]
 
 
 def suggestion_for(view: ObligationView, facts: Facts, today: date) -> Suggestion | None:

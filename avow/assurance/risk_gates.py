@@ -1,13 +1,17 @@
-"""The gates of hazards and of standards."""
+"""The gates of hazards, of failure rates and of standards."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 from avow.assurance.hazards import HazardView
-from avow.assurance.model import Gate, Suggestion
+from avow.assurance.model import Gate, ObligationView, RequirementView, Suggestion
+from avow.assurance.naming import requirement_claim
+from avow.assurance.policy import CRITICALITIES, Policy
+from avow.assurance.rates import exceeds, percent
 from avow.assurance.standards import StandardView, State
 from avow.base.plain import count, listed
+from avow.evidence.obligation import Kind
 
 
 def hazards_gate(hazards: Sequence[HazardView]) -> Iterable[Gate]:
@@ -33,6 +37,36 @@ def hazards_gate(hazards: Sequence[HazardView]) -> Iterable[Gate]:
         "; ".join(reasons) or f"{count(len(hazards), 'hazard')} mitigated",
         tuple(claims) or tuple(view.hazard.id for view in bare),
         tuple(remedies),
+    )
+
+
+def rates_gate(
+    policy: Policy, requirements: Sequence[RequirementView], views: Mapping[str, ObligationView]
+) -> Iterable[Gate]:
+    """A gate: a requirement that rests on samples fails no more often than the policy allows for the most critical node
+    below it."""
+    allowed = dict(policy.max_failure_rate)
+    if not allowed:
+        return
+    wrong = dict[str, str]()
+    asked = 0
+    for r in requirements:
+        below = {views[name].criticality for name in r.closure if views[name].obligation.kind is Kind.GUARANTEE}
+        highest = min((CRITICALITIES.index(c) for c in below if c in CRITICALITIES), default=0)
+        most = min((allowed[c] for c in CRITICALITIES[highest:] if c in allowed), key=float, default=None)
+        if r.rate is not None and most is not None:
+            asked += 1
+            if why := exceeds(r.rate, most):
+                wrong[r.id] = why
+    yield Gate(
+        "rates",
+        "Requirements that rest on samples fail rarely enough",
+        not wrong,
+        "; ".join(f"{name}: {why}" for name, why in wrong.items()) or f"{count(asked, 'requirement')} within the limit",
+        tuple(requirement_claim(name) for name in wrong),
+        (Suggestion("make more trials, or ask each sample for more confidence", cost=30),) if wrong else (),
+        asks=", ".join(f"at most {percent(rate)} at {criticality}" for criticality, rate in allowed.items()),
+        idle=not asked,
     )
 
 

@@ -126,7 +126,10 @@ REVIEW = evidence("n.g", Verdict.REVIEWED, "review", details={"reviewers": ["A",
 
 
 def test_no_single_point_of_evidence() -> None:
-    assert gate(the_case("default", PROOF, TEST))[0]
+    met = the_case("default", PROOF, TEST)
+    assert gate(met) == (True, "1 of 1 are supported: 1 proved and tested")
+    asks = next(g.asks for g in met.gates if g.id == "guarantees-high")
+    assert asks.startswith("proved or checked, supported by 2 independent methods, reviewed not")
     passed, reason = gate(the_case("default", PROOF))
     assert not passed
     assert "1 independent method, but 2" in reason
@@ -286,8 +289,9 @@ def test_persons_are_dearer_than_machines() -> None:
     assert suggestion.text.endswith("or `hoare` or `experiment`")
 
 
-def environment(*accepted: Finding, policy: Any = "sil3", formal: bool = False) -> Case:
-    """A requirement that rests on a guarantee and on what is assumed of the environment, with a person's reason."""
+def environment(*accepted: Finding, policy: Any = "sil3", formal: bool = False, reason: bool = False) -> Case:
+    """A requirement that rests on a guarantee (with `reason`, on a person's word alone) and on what is assumed of the
+    environment, with a person's reason."""
     subject = system(
         {"n": ["g"]},
         plans=[node_plan("n", "low", "hoare")],
@@ -299,11 +303,11 @@ def environment(*accepted: Finding, policy: Any = "sil3", formal: bool = False) 
             )
         ],
     )
-    reason = obligation("system", Kind.COMPOSITION, "environment.n.r", "0 <= r")
-    proof = evidence("n.g", tool="z3")
-    told = evidence(reason, Verdict.JUSTIFIED, "compose", strength=Verdict.PROVED)
+    condition = obligation("system", Kind.COMPOSITION, "environment.n.r", "0 <= r")
+    proof = evidence("n.g", Verdict.JUSTIFIED if reason else Verdict.PROVED, tool="z3")
+    told = evidence(condition, Verdict.JUSTIFIED, "compose", strength=Verdict.PROVED)
     own = obligation("system", Kind.REQUIREMENT, "R", "R follows")
-    listed = [guarantee("n", "g"), reason, *([own] if formal else [])]
+    listed = [guarantee("n", "g"), condition, *([own] if formal else [])]
     return case(subject, listed, [proof, told, *([evidence(own, method="compose")] if formal else [])])
 
 
@@ -353,6 +357,18 @@ def test_a_risk_that_is_taken_excuses_what_rests_on_it_until_its_day() -> None:
     assert not passed
     assert "R is justified, but proved is asked: it rests on what is assumed of n.r" in reason
     assert environment(risk(expires="2026-11-21")).exit_code == environment(risk()).exit_code  # its last day counts
+
+
+@pytest.mark.parametrize("name", [name for name in profile_names() if name != "reproduction"])
+def test_the_gates_agree_on_an_assumption_and_each_that_fails_has_a_next_step(name: str) -> None:
+    """A reason for a condition is accepted by the gate of the composition and by that of requirements, or by none; a
+    guarantee with a reason alone is no such condition."""
+    found = environment(policy=name, formal=True)
+    accepts = Status.JUSTIFIED in profile(name).composition
+    assert [gate(found, one)[0] for one in ("composition", "requirements")] == [accepts, accepts]
+    assert all(g.suggestions for g in found.gates if not g.passed and g.id != "standard")
+    alone = environment(policy=name, formal=True, reason=True)
+    assert gate(alone, "requirements")[0] == (Status.JUSTIFIED in profile(name).requirements)
 
 
 def test_of_a_slip_the_word_that_was_meant_is_told() -> None:
