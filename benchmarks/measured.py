@@ -47,8 +47,8 @@ def cost(command: Sequence[str | Path], folder: Path, environment: Mapping[str, 
     over.set()
     watch.join()
     with contextlib.suppress(ChildProcessError):
-        while True:
-            os.wait()
+        while os.waitpid(-1, os.WNOHANG)[0]:  # those that ended; a child of ours that goes on is none of the command's
+            pass
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     seconds = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
     return Cost(seconds, peaks[0] / 1024, output)
