@@ -11,8 +11,6 @@ from typing import Any
 @cache
 def packaged(package: str, name: str) -> Any:
     """What a .json or .yaml file in a package says. It is read once: do not change what is returned."""
-    import yaml  # slow, and not needed to import a backend
-
     text = resources.files(package).joinpath(name).read_text(encoding="utf-8")
     if name.endswith(".json"):
         return json.loads(text)
