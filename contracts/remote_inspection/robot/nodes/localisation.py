@@ -15,7 +15,7 @@ class Localisation:
         if not (math.isfinite(x) and math.isfinite(y)):
             return {
                 "position": self.held
-            }  # what is no number is no estimate; nothing is published before the first one
+            }  # what is no number is no estimate; before the first one there is no position
         if self.held is None or math.hypot(x - self.held[0], y - self.held[1]) > self.noise:
             self.held = (x, y)
         return {"position": self.held}
