@@ -182,7 +182,9 @@ def _first(done: Completed, reading: Reading, folder: Path) -> str:
         return "the compiler did not end in the time given"
     lines = [line for line in done.stderr.splitlines() if "error:" in line or "undefined reference" in line]
     text = (lines or done.stderr.strip().splitlines() or [f"the compiler ended with code {done.code}"])[0]
-    return plainly(text, reading, folder)[:300]
+    unnamed = re.search("(unknown type name|undeclared identifier) 'AvowNode'", text)
+    missing = f"{reading.adapter.name} defines no `struct AvowNode`: " if unnamed else ""
+    return (missing + plainly(text, reading, folder))[:300]
 
 
 def plainly(text: str, reading: Reading, folder: Path) -> str:

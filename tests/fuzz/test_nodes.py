@@ -202,6 +202,8 @@ def test_it_does_not_compile(tmp_path: Path) -> None:
     found = replace(LIMITER, adapter="struct AvowNode { int x = ; };\n").outcomes(tmp_path)
     assert {o.verdict for o in found.values()} == {Verdict.ERROR}
     assert "src/adapter.hpp:1" in found["same"].summary
+    found = replace(LIMITER, adapter="struct Node {};\n").outcomes(tmp_path / "unnamed")
+    assert "adapter.hpp defines no `struct AvowNode`" in found["same"].summary
 
 
 @pytest.mark.parametrize("cpp", [MEDIAN, SCAN, DEBOUNCER], ids=lambda cpp: cpp.node)
