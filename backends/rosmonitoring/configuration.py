@@ -29,8 +29,7 @@ def dotted_type(ros_type: str) -> str:
     parts = ros_type.split("/")
     if len(parts) == 1:
         builtin = parts[0]
-        short = builtin.capitalize().replace("Uint", "UInt")
-        return f"std_msgs.msg.{short}"
+        return f"std_msgs.msg.{builtin.capitalize().replace('Uint', 'UInt')}"
     return f"{parts[0]}.msg.{parts[-1]}"
 
 
@@ -81,9 +80,8 @@ def _file(monitors: list[dict[str, Any]], nodes: list[dict[str, Any]], version: 
 
 
 def _monitor(setup: Setup, options: Mapping[str, Any]) -> dict[str, Any]:
-    monitor_id = identifier("monitor_", setup.node.name)
     monitor: dict[str, Any] = {
-        "id": monitor_id,
+        "id": identifier("monitor_", setup.node.name),
         "log": f"./{identifier('', setup.node.name)}_log.txt",
         "silent": bool(options.get("silent", False)),
         "warning": int(options.get("warning", 1)),

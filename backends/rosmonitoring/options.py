@@ -10,7 +10,7 @@ from typing import Any
 
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.files import inside
-from avow.base.suggestions import suggest
+from avow.base.suggestions import nearest, suggest
 from avow.evaluation.evaluate import NotEvaluable, evaluate
 from avow.formulas.formula import free_variables
 from avow.formulas.values import FunctionValue, Value
@@ -211,6 +211,8 @@ class _Work:
     hidden: dict[str, str] = field(default_factory=dict)
     shared: dict[str, tuple[str, tuple[str, ...]]] = field(default_factory=dict)
     faults: list[Diagnostic] = field(default_factory=list)
+    meant: set[str] = field(default_factory=set)
+    """The variables whose names are probably misspelt in the mapping: that is reported, and what follows is not."""
 
     def mapping(self) -> Mapping[str, Any]:
         return observing.mapping_of(self.options)
@@ -220,6 +222,7 @@ class _Work:
         for name in self.mapping():
             if name not in known:
                 self.fault(f"{self.node.name} has no variable {name!r}", name, hint=suggest(name, sorted(known)))
+                self.meant |= {*nearest(name, known)}
 
     def duration(self, place: str, written: Any) -> Fraction:
         """A time of the options, in seconds; 0 with a recorded error if it is none."""
@@ -309,7 +312,8 @@ class _Work:
         try:
             found = self.rule(port)
         except observing.Wrong as error:
-            self.fault(str(error), name, *error.path, hint=error.hint)
+            if name in self.mapping() or name not in self.meant:
+                self.fault(str(error), name, *error.path, hint=error.hint)
             self.hidden[name] = str(error)
             return
         if isinstance(found, str):

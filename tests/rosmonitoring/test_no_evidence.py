@@ -192,6 +192,8 @@ def test_a_slip_in_the_mapping_is_one_fault_for_check_and_monitor(make_system: M
     mapping = {"in.r": {"field": "x", "nan": "nil", "elsewhere": 0}, "out.v": "y"}
     system = make_system(rcl, mapping, messages=messages)
     assert [d.code for d in of_plan(system) if d.is_error] == ["PLAN105"]
+    system = make_system(rcl, {"in.r": "x", "out.vv": "y"}, messages=messages)  # of `out.v` nothing is told then
+    assert [d.hint for d in of_plan(system) if d.is_error] == ["did you mean `out.v`?"]
     system = make_system(rcl, {"in.r": "x", "out.v": "y"}, messages=messages, answers={"by": "arrival", "because": "…"})
     with pytest.raises(Rejected, match="a reason in words"):
         session(system)
