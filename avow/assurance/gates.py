@@ -6,7 +6,6 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from datetime import date
-from typing import assert_never
 
 from avow.assurance.answers import EARLIER
 from avow.assurance.certification import ProofView, certifiable, claimed
@@ -69,12 +68,8 @@ def gates(
         *rates_gate(facts.policy, requirements, views),
         *_certified(facts, proofs, fresh),
     )
-    return tuple(
-        gate
-        if gate.passed or gate.suggestions
-        else replace(gate, suggestions=(Suggestion(_NEXT.get(gate.id, _EVIDENCE)),))
-        for gate in found
-    )
+    steps = {gate.id: (Suggestion(_NEXT.get(gate.id, _EVIDENCE)),) for gate in found}
+    return tuple(g if g.passed or g.suggestions else replace(g, suggestions=steps[g.id]) for g in found)
 
 
 _EVIDENCE = "give each claim that fails, and what it rests on, the evidence that is asked"
@@ -171,16 +166,8 @@ def _findings(facts: Facts, findings: Sequence[Handled], obligations: Sequence[O
 
 def _nothing_wrong(facts: Facts, obligations: Sequence[ObligationView], excused: set[str]) -> Gate:
     wrong = [v for v in obligations if v.status in FINDINGS and not v.advice]
-    return _gate(
-        "refuted",
-        "Nothing is refuted, contradictory or vacuous",
-        wrong,
-        excused,
-        lambda view: view.status.value,
-        "nothing else is refuted, contradicted or vacuous"
-        if excused
-        else "no claim is refuted, contradicted or vacuous",
-    )
+    good = f"{'nothing else' if excused else 'no claim'} is refuted, contradicted or vacuous"
+    return _gate("refuted", "Nothing is refuted, contradictory or vacuous", wrong, excused, _worded, good)
 
 
 def _held_to(name: str, title: str, views: Sequence[ObligationView], good: Sequence[Status], excused: set[str]) -> Gate:
@@ -417,17 +404,12 @@ def _gate(
     let_off = tuple(view.id for view in failing if view.id in excused)
     shown = "; ".join(f"{short(view.id)}: {why(view)}" for view in bad[:5])
     more = f"; and {len(bad) - 5} more" if len(bad) > 5 else ""
-    if bad:
-        reason = shown + more
-    elif let_off:
-        reason = f"{good}; {count(len(let_off), 'finding')} excused by the plan"
-    else:
-        reason = good
+    pardoned = f"; {count(len(let_off), 'finding')} excused by the plan" if let_off else ""
     return Gate(
         name,
         title,
         not bad,
-        reason,
+        shown + more if bad else good + pardoned,
         tuple(view.id for view in bad),
         _steps(s for view in bad for s in _suggestion(view)),
         let_off,
@@ -469,19 +451,10 @@ def suggestion_for(view: ObligationView, facts: Facts, today: date) -> Suggestio
 
 
 def _asked(kind: Kind, facts: Facts) -> Sequence[Status]:
-    match kind:
-        case Kind.SANITY:
-            return facts.policy.sanity
-        case Kind.COMPOSITION:
-            return facts.policy.composition
-        case Kind.REQUIREMENT:
-            return facts.policy.requirements
-        case Kind.PROGRAM:
-            return facts.policy.programs
-        case Kind.WELL_FORMED | Kind.GUARANTEE:  # its gate names no methods
-            return ()
-        case _:
-            assert_never(kind)
+    """The statuses that the policy accepts for claims of a kind; empty if its gate names none."""
+    asked = facts.policy
+    of = {Kind.SANITY: asked.sanity, Kind.COMPOSITION: asked.composition, Kind.REQUIREMENT: asked.requirements}
+    return {**of, Kind.PROGRAM: asked.programs}.get(kind, ())
 
 
 def _all_excused(below: Sequence[str], excused: set[str]) -> bool:
