@@ -206,7 +206,8 @@ class WeakestEvidence:
     @property
     def others(self) -> str:
         """The text after the requirements that need it: why more of them name the same node."""
-        return f"; {count(self.beside, 'other requirement')} on other guarantees of this node" if self.beside else ""
+        others = count(self.beside, "other requirement")
+        return f"; {others} rest{'s' * (self.beside == 1)} on this node's other guarantees" if self.beside else ""
 
 
 @dataclass(frozen=True, slots=True)

@@ -510,7 +510,10 @@ def test_requirements_on_another_guarantee_of_the_weakest_node_are_counted_besid
     whole = case(system({"a": ["g", "h"]}, requirements=asked, hazards=[danger]), node, made)
     found = whole.answers.weakest
     assert found is not None
-    assert (found.needed_by, found.others) == (("R1", "H"), "; 2 other requirements on other guarantees of this node")
+    assert (found.needed_by, found.others) == (
+        ("R1", "H"),
+        "; 2 other requirements rest on this node's other guarantees",
+    )
     assert whole.answers.next_weakest.startswith("a: “a meets h”: 10 cases")
     proved = case(system({"a": ["g", "h"]}, requirements=asked), node, [made[0], evidence(node[1])])
     assert proved.answers.next_weakest == "", "a proof is not weak"
