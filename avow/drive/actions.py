@@ -72,9 +72,6 @@ class _Action(Strict):
             f"{own}/cancel_goal",
         )
 
-    def destroy(self) -> None:
-        raise self._driven.refuse(f"{self._called}.destroy")
-
 
 class ServerGoalHandle(Strict):
     _called = "rclpy.action.server.ServerGoalHandle"
@@ -123,9 +120,6 @@ class ServerGoalHandle(Strict):
         if response is not None:
             self._server.answer(self, response)
 
-    def destroy(self) -> None:
-        """It is kept until its result is sent."""
-
 
 class ActionServer(_Action):
     _called = "rclpy.action.ActionServer"
@@ -163,18 +157,6 @@ class ActionServer(_Action):
         if f"{self.cancel}/_request" in driven.topics:
             service = next(kind for kind, name in driven.services.items() if name == CANCEL)
             driven.serve(self.cancel, service, lambda request: self.canceled(service, request), self.group)
-
-    def register_goal_callback(self, goal_callback: Any) -> None:
-        self.on_goal = goal_callback
-
-    def register_handle_accepted_callback(self, handle_accepted_callback: Any) -> None:
-        self.on_accepted = handle_accepted_callback
-
-    def register_cancel_callback(self, cancel_callback: Any) -> None:
-        self.on_cancel = cancel_callback
-
-    def register_execute_callback(self, execute_callback: Any) -> None:
-        self.on_execute = execute_callback
 
     def requested(self, goal: Any, call: str) -> None:
         accepted = self._driven.call(self.on_goal, goal) is GoalResponse.ACCEPT

@@ -14,8 +14,6 @@ SECOND = 10**9
 DEFAULTS = {"raw": False, "autostart": True, "start_parameter_services": True, "enable_rosout": True}
 DEFAULTS |= {"allow_undeclared_parameters": False, "automatically_declare_parameters_from_overrides": False}
 KEYWORDS = {*DEFAULTS, "callback_group", "event_callbacks", "qos_overriding_options", "content_filter_options", "clock"}
-KEYWORDS |= {f"{part}_qos_profile" for part in ("goal_service", "result_service", "cancel_service", "feedback_pub")}
-KEYWORDS |= {f"{part}_qos_profile" for part in ("status_pub", "feedback_sub", "status_sub")}
 KEYWORDS |= {"publisher_class", "context", "cli_args", "parameter_overrides", "rosout_qos_profile"}
 """Keyword arguments of rclpy's Node and its methods: any other one is an error of the class, there as here."""
 OF_NODES: tuple[str, ...] = ("create_", "destroy_", "get_", "set_", "add_", "remove_", "declare_", "undeclare_")

@@ -5,18 +5,21 @@ from __future__ import annotations
 import array
 import inspect
 import math
+import re
 import sys
 from collections import UserList, UserString
 from collections.abc import Callable, Sequence, Set
 from typing import Any
 
-from . import actions, filters, lifecycle, parameters
+from . import actions, filters, lifecycle, parameters, tf2
 from .callbacks import Driven, answers
 from .messages import INTEGERS
 from .nodes import ENTITIES, GROUPS, QOS, Duration, Future, Log, Node, Time
 from .refusals import Strict
 
 SECOND = 10**9
+SLEEPS = re.compile(r"\bsleep|\btimeout")
+"""What in a file's text may let a callback wait."""
 LARGEST = {"float32": 3.402823466e38, "float64": 1.7976931348623157e308}
 ARRAYS = {"float32": "f", "float64": "d", "int8": "b", "uint8": "B", "int16": "h", "uint16": "H"}
 ARRAYS |= {"int32": "i", "uint32": "I", "int64": "q", "uint64": "Q"}
@@ -46,13 +49,15 @@ def modules(spec: Any, own: Sequence[str]) -> Callable[[Any, Any], Callable[[str
     content: dict[str, Any] = {name: driven.module(f"rclpy.{name}", content) for name, content in inside.items()}
     filters.Subscriber.subscribe = _subscribed
     driven.module("message_filters", filters.CONTENT)
+    parts = {name: driven.module(f"tf2_ros.{name}", tf2.CONTENT) for name in tf2.PARTS}
+    driven.module("tf2_ros", parts | tf2.CONTENT)
     driven.module("rclpy", content | {"Parameter": parameters.Parameter, "ok": lambda context=None: True})
 
     def make(made: Any, params: Any) -> Any:
         if not issubclass(made, Node):
             raise TypeError(f"{made.__name__} is no rclpy.node.Node")
         text = inspect.getsource(sys.modules[made.__module__])
-        driven.sleeps, driven.parallel = "sleep" in text, MultiThreadedExecutor.__name__ in text
+        driven.sleeps, driven.parallel = bool(SLEEPS.search(text)), MultiThreadedExecutor.__name__ in text
         driven.order *= driven.parallel
         node = made()
         if isinstance(node, lifecycle.LifecycleNode) and not node._avow_asked_for:

@@ -451,6 +451,43 @@ class Watch(Node):
         self.state.publish(Float64(data=fastest))
         self.fastest = 1.5
 """
+FENCE = """\
+node watch {
+  inputs( ahead : REAL )
+  outputs( gone : BOOL )
+  topics( float64 ahead matches(in.ahead), tf2_msgs/TFMessage /tf, bool gone matches(out.gone) )
+  guarantee far ( in.ahead >= 10 -> out.gone )
+}
+"""
+LISTENER = """\
+import rclpy
+import tf2_ros
+from rclpy.duration import Duration
+from rclpy.node import Node
+from std_msgs.msg import Bool, Float64
+from tf2_ros import TransformException
+from tf2_ros.buffer import Buffer
+from tf2_ros.transform_listener import TransformListener
+
+
+class Watch(Node):
+    def __init__(self):
+        super().__init__("watch")
+        self.buffer = Buffer(cache_time=Duration(seconds=5))
+        self.listener = TransformListener(self.buffer, self)
+        self.out = self.create_publisher(Bool, "gone", 10)
+        self.create_subscription(Float64, "ahead", self.heard, 10)
+
+    def heard(self, message):
+        try:
+            at = self.buffer.lookup_transform("map", "base", rclpy.time.Time())
+        except TransformException as error:
+            assert isinstance(error, (tf2_ros.LookupException, tf2_ros.ExtrapolationException)), error
+            self.out.publish(Bool(data=True))
+            return
+        x = at.transform.translation.x
+        self.out.publish(Bool(data=message.data + abs(x) >= 10.0))
+"""
 SPINS = {"mover/package.xml": PACKAGE["ws/src/mover/package.xml"]}
 SPINS |= {"mover/action/Spin.action": "int32 turns\n---\nint32 done\n---\nint32 sofar\n"}
 RANGES = "{in.left: range, in.right: range}"
@@ -517,6 +554,9 @@ NODES = {
         options="messages: [mover/action]\n",
         cases="900",
     ),
+    "a listener to transforms": Made(
+        FENCE, {"src/fence.py": LISTENER}, (("+ abs(x)", "- abs(x)"), ("(data=True)", "(data=False)"))
+    ),
     "callbacks that run together": Made(
         re.sub(".*followed.*\n", "", LIMIT),
         {"src/racing.py": RACING},
@@ -543,6 +583,67 @@ def test_a_node_is_driven_and_its_mutants_are_caught(tmp_path: Path, name: str) 
         assert files != made.files, old
         wrong = verdicts(system(tmp_path / str(number), replace(made, files=files)))
         assert {o.verdict for o in wrong.values()} != {Verdict.TESTED}, (old, new)
+
+
+TREE = """
+        import math
+
+        from geometry_msgs.msg import TransformStamped
+        from rclpy.time import Time
+
+        tree = Buffer()
+
+        def put(child, parent, at, x, yaw=0.0, static=False):
+            made = TransformStamped(child_frame_id=child)
+            made.header.frame_id, made.header.stamp.sec = parent, at
+            made.transform.translation.x = x
+            made.transform.rotation.z, made.transform.rotation.w = math.sin(yaw / 2), math.cos(yaw / 2)
+            (tree.set_transform_static if static else tree.set_transform)(made, "")
+
+        def found(target, source, at):
+            try:
+                made = tree.lookup_transform(target, source, Time(seconds=at))
+            except TransformException as error:
+                return type(error).__name__
+            moved, turned = made.transform.translation, made.transform.rotation
+            numbers = (moved.x, moved.y, 2 * math.atan2(turned.z, turned.w))
+            return [made.header.stamp.sec, *(round(n, 6) for n in numbers)]
+
+        for at, x, yaw in ((1, 0.0, 0.0), (3, 4.0, math.pi / 2)):
+            put("base", "odom", at, x, yaw)
+        put("odom", "map", 2, 10.0)
+        put("odom", "map", 4, 20.0)
+        put("laser", "base", 0, 1.0, static=True)
+        put("other", "world", 1, 0.0)
+        half, root = round(math.pi / 4, 6), round(math.sqrt(0.5), 6)
+        wanted = {
+            ("odom", "base", 2): [2, 2.0, 0.0, half],
+            ("map", "laser", 2): [2, 12 + root, root, half],
+            ("map", "base", 0): [3, 19.0, 0.0, round(math.pi / 2, 6)],
+            ("laser", "base", 0): [0, -1.0, 0.0, 0.0],
+            ("base", "odom", 3): [3, 0.0, 4.0, round(-math.pi / 2, 6)],
+            ("base", "base", 0): [3, 0.0, 0.0, 0.0],
+            ("odom", "base", 4): "ExtrapolationException",
+            ("map", "base", 1): "ExtrapolationException",
+            ("odom", "other", 0): "ConnectivityException",
+            ("odom", "none", 1): "LookupException",
+            ("/odom", "base", 1): "InvalidArgumentException",
+        }
+        wrong = {at: found(*at) for at in wanted if found(*at) != wanted[at]}
+        assert not wrong, wrong
+        put("odom", "map", 20, 0.0)
+        assert found("map", "odom", 4) == "ExtrapolationException" and not tree.can_transform("map", "none", Time())
+"""
+
+
+@pytest.mark.slow
+def test_transforms_are_those_of_tf2(tmp_path: Path) -> None:
+    """Interpolated, composed and inverted, of the latest common time; none outside of the stored times."""
+    made = NODES["a listener to transforms"]
+    begin = '        super().__init__("watch")'
+    text = made.files["src/fence.py"].replace(begin, begin + TREE)
+    done = drive(system(tmp_path / "w", replace(made, files={"src/fence.py": text})), "watch")
+    assert done.return_value == 0, (done.output, done.exception)
 
 
 @pytest.mark.slow

@@ -180,7 +180,7 @@ class Driver:
         numbers = numbers_of(clause.formula for clause in clauses)
         numbers = numbers | set(written(self.text)) | set(leaves(self.subject.params))
         words = sorted({word for port in (*self.node.inputs, *self.node.outputs) for word in _words(port.sort)})
-        drawing = _Drawing(pool(numbers), words, self.known, chance)
+        drawing = _Drawing(pool(numbers), words, self.known, chance, _FRAMES.findall(self.text))
         at = 0  # nanoseconds
         alike: dict[str, Sequence[str]] = {topic: group for group in self.topics.together for topic in group}
         due: list[str] = []
@@ -390,6 +390,7 @@ def fresh(wire: Wire, known: Definitions) -> Any:
     return code(wire, {} if isinstance(wire, Nested) else _ZERO.get(wire.name, 0), known)
 
 
+_FRAMES = re.compile(r"_transform\(\s*[\"']([\w/]+)[\"'],\s*[\"']([\w/]+)[\"']")
 _ZERO: dict[str, Any] = {"bool": False, "string": "", "wstring": ""}
 _ZERO |= {name: {"sec": 0, "nanosec": 0} for name in ("time", "duration")}
 
@@ -439,6 +440,8 @@ class _Drawing:
     words: list[str]
     known: Definitions
     chance: random.Random
+    frames: Sequence[tuple[str, str]]
+    """Pairs of frames whose transforms the program looks up."""
     last: float = 0.0
     made: dict[str, list[Any]] = field(default_factory=dict)
     """Type → the messages so far."""
@@ -452,6 +455,15 @@ class _Drawing:
     def message(self, wire: Wire, at: int) -> Any:
         """A message whose header has its time of arrival."""
         match wire:
+            case Nested(name="geometry_msgs/TransformStamped") if self.frames:
+                (parent, child), half = self.chance.choice(self.frames), self.chance.choice(self.numbers.floats)
+                unit = {"x": 0.0, "y": 0.0, "z": math.sin(half), "w": math.cos(half)}
+                made: dict[str, Any] = shown(wire, fresh(wire, self.known), self.known, Driving.RCLPY)
+                made["header"] |= {"stamp": dict(zip(("sec", "nanosec"), divmod(at, SECOND), strict=True))}
+                made["header"]["frame_id"], made["child_frame_id"] = parent, child
+                made["transform"]["rotation"] = unit
+                made["transform"]["translation"] = {axis: self.number() for axis in "xyz"}
+                return code(wire, made, self.known)
             case Nested(name=name):
                 message = self.known.get(name)
                 assert message is not None
