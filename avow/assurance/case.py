@@ -151,7 +151,9 @@ def conclude(facts: Facts) -> Case:
     found = gates(facts, views, requirements, derived, hazards, findings, proofs, relied, fresh, granted)
     standard = None
     if facts.policy.standard:
-        standard = standard_view(facts.policy.standard, facts.policy.level, found, requirements, views, hazards)
+        standard = standard_view(
+            facts.policy.standard, facts.policy.level, found, requirements, views, hazards, supposed
+        )
         found = (*found, standard_gate(standard))
     listed = (
         *open_items(facts, views, requirements, derived, findings),

@@ -75,4 +75,5 @@ def standard_gate(standard: StandardView) -> Gate:
     lacking = [o for o in standard.objectives if o.state is State.OPEN]
     reason = "; ".join(f"{o.id}: {o.why}" for o in lacking) or standard.counts
     title = f"Objectives of {standard.title} that contracts can serve"
-    return Gate("standard", title, not lacking, reason, tuple(o.id for o in lacking))
+    steps = tuple(Suggestion(text) for text in dict.fromkeys(o.next for o in lacking))
+    return Gate("standard", title, not lacking, reason, tuple(o.id for o in lacking), steps)

@@ -313,7 +313,7 @@ RULES = (
     _rule("head", r"SHA-(256)", lambda _f, m, _b: m.groups()),
     _rule("gates", r"\(([^()]*\d[^()]*)\)(?=: )", _policy),
     _rule("hazards", r"^ ␟ (.*?) ␟ (.*?)(?: \(security\))? ␟ .*? ␟ .*? weakest: (.*?); (.*?) ␟ ", _hazard),
-    _rule("standard", r"(\d+) (served|open|outside)\b", _objectives),
+    _rule("standard", r"(\d+) (served|partly served|open|outside)\b", _objectives),
 )
 
 
