@@ -176,8 +176,7 @@ class Driver:
         parameters."""
         chance = random.Random(seed)
         topics = sorted(self.inputs)
-        clauses = (*self.node.assumptions, *self.node.guarantees)
-        numbers = numbers_of(clause.formula for clause in clauses)
+        numbers = numbers_of(clause.formula for clause in (*self.node.assumptions, *self.node.guarantees))
         numbers = numbers | set(written(self.text)) | set(leaves(self.subject.params))
         words = sorted({word for port in (*self.node.inputs, *self.node.outputs) for word in _words(port.sort)})
         drawing = _Drawing(pool(numbers), words, self.known, chance, _FRAMES.findall(self.text))
@@ -280,8 +279,7 @@ class Silent(Rejected):
 def _refused(source: Source, text: str, kind: type[Rejected] = Rejected) -> Rejected:
     """At the line that the text names, if that is of the class's own file; otherwise at the plan's entry."""
     span, found = source.place.at("source"), re.search(r" \((\S+), line (\d+)\)", text)
-    file = Path(span.file if span else "").parent / source.python
-    if found and found[1] == file.name and file.is_file():
+    if (file := Path(span.file if span else "").parent / source.python).is_file() and found and found[1] == file.name:
         span = Span(str(file), int(found[2]), 1, int(found[2]), 2)
     return kind(Diagnostic("DRIVE103", text, span))
 
