@@ -187,7 +187,7 @@ class Queries:
                 models = [v for v in self.guarantees if v.standing.supports and not _of(v, *_PROGRAMS)]
                 alone = {v.obligation.node for v in models if not self.compared(v)}
                 return _named("models that no program was compared with", sorted(alone))
-            case _:
+            case _:  # assumptions, the last of NAMES
                 bad = [a.number for a in self.assumptions if a.expired or not (a.owned and a.because)]
                 return _named("assumptions without a reason, an owner or a last day that is to come", bad)
 
