@@ -278,6 +278,7 @@ def answers(driven: Driven, make: Callable[[Any, Any], Any]) -> Callable[[Any, A
             wrong = on = state = ""
             try:
                 node = make(made, driven.params)
+                driven.order *= driven.parallel  # one thread has one order
                 state = getattr(node, "_avow_state", "")
                 if state and not asked["events"]:
                     node._avow_activate()  # for its topics

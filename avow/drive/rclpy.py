@@ -58,7 +58,6 @@ def modules(spec: Any, own: Sequence[str]) -> Callable[[Any, Any], Callable[[str
             raise TypeError(f"{made.__name__} is no rclpy.node.Node")
         text = inspect.getsource(sys.modules[made.__module__])
         driven.sleeps, driven.parallel = bool(SLEEPS.search(text)), MultiThreadedExecutor.__name__ in text
-        driven.order *= driven.parallel
         node = made()
         if isinstance(node, lifecycle.LifecycleNode) and not node._avow_asked_for:
             node._avow_activate()
