@@ -14,6 +14,6 @@ def packaged(package: str, name: str) -> Any:
     text = resources.files(package).joinpath(name).read_text(encoding="utf-8")
     if name.endswith(".json"):
         return json.loads(text)
-    import yaml  # importing a backend does not need it
+    import yaml  # slow, and not needed to import a backend
 
     return yaml.load(text, getattr(yaml, "CSafeLoader", yaml.SafeLoader))
