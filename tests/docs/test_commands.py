@@ -76,10 +76,8 @@ COMPOSED = "avow compose thermostat"
 MONITORED = "avow monitor thermostat contracts/thermostat/traces/morning.jsonl"
 FRETISH = "avow fretish requirements.json -o contracts/tank/system.rcl"
 INSTEAD = {
-    "avow fretish FILE": "avow fretish requirements.json",
     "avow translate --to fretish contracts/tank/system.rcl": f"{FRETISH}"
     " && avow translate --to fretish contracts/tank/system.rcl",
-    "avow agent run FILE": "avow agent run lamp.gwen",
     "avow audit --new-key": KEYED,
     "avow audit --sign release.key": f"{KEYED} && avow audit --sign my.key",
     "avow audit --key release.key.pub": f"{KEYED} && avow audit --sign my.key && avow audit --key my.key.pub",
@@ -96,15 +94,11 @@ INSTEAD = {
     "avow refines A B [--node n] [--rename new=old]": "avow refines thermostat thermostat"
     " && avow refines thermostat thermostat --node thermostat --rename mode=mode",
     "avow report --check": "avow report --check thermostat",
-    "avow requirements FILE": "avow requirements requirements.csv",
-    "avow review sign SYSTEM NODE --key FILE": f"{KEYED} && {STAMPED}"
-    " && avow review sign thermostat thermometer --key my.key",
     "avow review sign SYSTEM NODE --key KEY [--method ID]": f"{KEYED} && {STAMPED}"
     " && avow review sign contracts/thermostat thermometer --key my.key --method review",
     "avow review stamp SYSTEM NODE [--method ID] [--renewed DATE]": f"{STAMPED}"
     " && avow review stamp contracts/thermostat thermometer --method review --renewed 2026-11-22",
     "avow sanity --json": "avow sanity thermostat --json",
-    "avow sign --report SYSTEM": SIGNED,
     'avow sign --report SYSTEM --as "A. Person, safety engineer" --until 2027-11-22 [--key FILE]': f"{SIGNED}"
     f" && {KEYED} && {SIGNED} --key my.key",
     "avow verify --key FILE": f"{KEYED} && avow verify --key my.key",
@@ -113,7 +107,6 @@ INSTEAD = {
     "avow check FILE.rcl …": "avow check contracts/thermostat/system.rcl",
     "avow review sign": f"{KEYED} && {STAMPED} && avow review sign thermostat thermometer --key my.key",
     "avow audit --new-key FILE": KEYED,
-    "avow refines NEW OLD": "avow refines thermostat thermostat",
     "avow translate --to dafny PATH [--node NAME] [-o FOLDER]": "avow translate --to dafny thermostat -o made"
     " && avow translate --to dafny thermostat --node thermostat",
     "avow translate --to rml SYSTEM [--node NAME] [-o FOLDER]": "avow translate"
