@@ -14,7 +14,7 @@ from typing import Any
 
 from avow.base.module_path import leave_here
 from avow.base.suggestions import did_you_mean
-from avow.base.tuning.running import COLLECTED
+from avow.base.tuning.running import COLLECTED_IN_WORKS
 
 leave_here()  # before any import that a module in another's folder could replace
 
@@ -22,7 +22,7 @@ import click  # noqa: E402
 
 from avow import __version__  # noqa: E402
 
-gc.set_threshold(COLLECTED)  # a command's objects mostly stay alive, so collections find little
+gc.set_threshold(COLLECTED_IN_WORKS)  # most objects of a command stay alive, so collections find little
 
 COMMANDS = {
     "agent": "run an agent program step by step, on percepts that you give",
