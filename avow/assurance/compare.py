@@ -33,7 +33,7 @@ class Answer:
 
 
 @dataclass(frozen=True, slots=True)
-class Told:
+class ClaimFacts:
     """The known facts about a claim besides its status."""
 
     title: str = ""
@@ -65,7 +65,7 @@ class Snapshot:
     name: str
     claims: Mapping[str, tuple[str, Status]]
     gates: Mapping[str, bool]
-    told: Mapping[str, Told] = field(default_factory=dict)
+    told: Mapping[str, ClaimFacts] = field(default_factory=dict)
     reasons: Mapping[str, str] = field(default_factory=dict)
     """Gate → the reason why it fails or passes."""
     assumptions: Mapping[str, str] | None = None
@@ -135,7 +135,10 @@ def of_case(case: Case) -> Snapshot:
         case.system,
         {v.id: (v.obligation.digest, v.standing) for v in views},
         {g.title: g.passed for g in case.gates if case.audited or g.id not in _OF_RUN},
-        {v.id: Told(v.obligation.claim, _answers(v), v.below, v.obligation.formula, v.obligation.span) for v in views},
+        {
+            v.id: ClaimFacts(v.obligation.claim, _answers(v), v.below, v.obligation.formula, v.obligation.span)
+            for v in views
+        },
         {g.title: g.reason for g in case.gates},
         {s.key: f"{s.words}{' (expired)' if s.expired else ''}" for s in case.assumptions if not s.general},
         {r.id: Required(r.words, r.level, r.meaning, r.formal, r.closure, r.span) for r in case.requirements},
@@ -149,7 +152,7 @@ def of_signature(name: str, signed: Baseline) -> Snapshot:
         name,
         {claim: (digest, Status(status)) for claim, digest, status, _, _ in signed.guarantees},
         {},
-        {claim: Told(formula=formula) for claim, _, _, formula, _ in signed.guarantees},
+        {claim: ClaimFacts(formula=formula) for claim, _, _, formula, _ in signed.guarantees},
         {},
         {key: words for key, words, _ in signed.assumptions if key not in GENERAL},
         {name: Required(name, Level(level), meaning, formal) for name, meaning, level, formal in signed.requirements},
@@ -177,7 +180,7 @@ def of_ledger(name: str, entries: Iterable[Entry]) -> Snapshot:
         name,
         {o: (digests[o], roll_up(records)) for o, records in grouped.items()},
         {},
-        {o: Told("", found) for o, found in answers.items()},
+        {o: ClaimFacts("", found) for o, found in answers.items()},
     )
 
 
@@ -188,7 +191,7 @@ def compare(old: Snapshot, new: Snapshot) -> tuple[Change, ...]:
         new = replace(new, claims={name: new.claims[name] for name in kept}, told=kept)
     changes: list[Change] = []
     for name in dict.fromkeys((*old.claims, *new.claims)):
-        before, after = old.told.get(name, Told()), new.told.get(name, Told())
+        before, after = old.told.get(name, ClaimFacts()), new.told.get(name, ClaimFacts())
         title = after.title or before.title
         if name not in new.claims:
             changes.append(Change("removed", name, old.claims[name][1], "", title))
@@ -305,14 +308,14 @@ def _gone(item: EvidenceView, view: ObligationView) -> str:
             assert_never(item.currency)
 
 
-def _asked_again(before: Told, after: Told) -> Iterator[str]:
+def _asked_again(before: ClaimFacts, after: ClaimFacts) -> Iterator[str]:
     for method, answer in after.answers.items():
         known = before.answers.get(method)
         if known is not None and not answer.gone and known.mark != answer.mark:
             yield method
 
 
-def _why(before: Told, after: Told) -> Iterator[str]:
+def _why(before: ClaimFacts, after: ClaimFacts) -> Iterator[str]:
     """The reasons for a difference: the evidence, method by method; then the claims below."""
     for method in dict.fromkeys((*after.answers, *before.answers)):
         yield from _of_method(method, before.answers.get(method), after.answers.get(method))

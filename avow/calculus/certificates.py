@@ -22,7 +22,7 @@ from avow.calculus.subsystem_contracts import innermost
 from avow.calculus.wiring import wiring
 from avow.kernel.certificate import Certificate, Entry, How, Question, Use
 from avow.kernel.check import Established, Kernel, Refused
-from avow.kernel.solvers import Said, Solvers
+from avow.kernel.solvers import Reply, Solvers
 from avow.kernel.statements import Claimed, Statement, Statements, statements
 
 if TYPE_CHECKING:
@@ -68,7 +68,7 @@ class Certificates:
     @property
     def late(self) -> bool:
         """Whether a Z3 query ran out of time: a faster machine might establish more."""
-        return Said.LATE in self.solvers.known.values()
+        return Reply.LATE in self.solvers.known.values()
 
     def condition(self, goal: Goal, about: str, bounds: Bounds) -> Established | None:
         """Establish the assumption of a node (``agent.low``; in a subsystem ``robot.agent.low``) in a derivation."""

@@ -13,11 +13,11 @@ from avow.base.tuning.effort import DEFEAT_EFFORT
 from avow.base.verdict import Verdict
 from avow.calculus.certificates import Certificates
 from avow.calculus.derivation import ClauseName, Goal, Settled, SideCondition
-from avow.calculus.discharge import Answers, Bounds, Claim, Told, settle
+from avow.calculus.discharge import Answers, Bounds, Claim, Progress, settle
 from avow.calculus.entailment import ask_once
 from avow.calculus.rules import WHOLE, derive
 from avow.calculus.scenario import world
-from avow.calculus.subsystem_contracts import Level, Said, composed_node, innermost, level, with_persistence
+from avow.calculus.subsystem_contracts import Level, Reply, composed_node, innermost, level, with_persistence
 from avow.calculus.transition import Machine
 from avow.calculus.variables import Frame, frame
 from avow.formulas.finite import interpretation
@@ -122,7 +122,7 @@ class Composition:
     """The nodes of the system as a whole."""
     around: Mapping[str, str] = field(default_factory=dict)
     """Node or subsystem → the subsystem that it is directly in."""
-    told: Told | None = field(default=None, compare=False)
+    told: Progress | None = field(default=None, compare=False)
     """Called with each side condition of a goal as soon as it is answered."""
     claims: Mapping[str, Mapping[SideCondition, Claim]] = field(default_factory=dict, compare=False)
     """Goal → the claims of its side conditions, if only some of them are requested."""
@@ -367,7 +367,7 @@ def composed_over(flat: Frame) -> Composition:
     inside = leaves(system.plan)
     faces = {name: face(system, flat.graph, name, held) for name, held in inside.items()}
     composed: dict[str, Node] = {}
-    clauses: Said = {}
+    clauses: Reply = {}
     goals: dict[str, Goal] = {}
     levels: dict[str, Level] = {}
 

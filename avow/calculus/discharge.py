@@ -65,7 +65,7 @@ class Answers:
         return Verdict.UNKNOWN if verdicts - {Verdict.PROVED} else Verdict.PROVED
 
 
-Told = Callable[[str, Settled], None]
+Progress = Callable[[str, Settled], None]
 """Called with the goal's name and a side condition's answer, which may still change if proofs are circular."""
 
 
@@ -81,7 +81,7 @@ def settle(
     frame: Frame,
     goal: Goal,
     bounds: Bounds | None = None,
-    report: Told | None = None,
+    report: Progress | None = None,
     claims: Mapping[SideCondition, Claim] | None = None,
 ) -> Answers:
     """Check every side condition of a derivation, and judge its loops. For `claims` that are not requested, the earlier

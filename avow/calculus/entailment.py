@@ -28,7 +28,7 @@ from avow.base.tuning.effort import QUICK_EFFORT
 from avow.base.tuning.sizes import ANSWERS_KEPT
 from avow.base.verdict import Verdict
 from avow.formulas.formula import digest, substitute
-from avow.kernel.solvers import Said, ask_z3
+from avow.kernel.solvers import Reply, ask_z3
 from avow.language.terms import And, Quantified, Quantifier, Role, Term, Variable
 from avow.solving.questions import Entailment, entails
 from avow.solving.translation import new_session
@@ -43,7 +43,7 @@ class NotProved:
     used_before: tuple[str, ...] = ()
 
 
-_Kept = tuple[tuple[str, ...], bool] | Said | NotProved
+_Kept = tuple[tuple[str, ...], bool] | Reply | NotProved
 
 
 @dataclass(slots=True)
@@ -93,17 +93,17 @@ def kept_answers() -> KeptAnswers | None:
     return _kept.get()
 
 
-def ask_once(script: str, budget: int) -> Said:
+def ask_once(script: str, budget: int) -> Reply:
     """The same as `avow.kernel.solvers.ask_z3`, cached: only to predict the answer that the kernel will get."""
     kept = _kept.get()
     if kept is None:
         return ask_z3(script, budget)
     mark = sha256(f"{budget}\n{script}")
     found = kept.find(mark)
-    if not isinstance(found, Said):
+    if not isinstance(found, Reply):
         kept.asked += 1
         found = ask_z3(script, budget)
-        if found in (Said.SAT, Said.UNSAT):
+        if found in (Reply.SAT, Reply.UNSAT):
             kept.now[mark] = found
     return found
 

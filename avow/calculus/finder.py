@@ -25,7 +25,7 @@ from avow.calculus.induction import label
 from avow.calculus.variables import OBSERVED
 from avow.kernel.certificate import Certificate, Entry, How, Question, Use
 from avow.kernel.check import Kernel, Refused
-from avow.kernel.solvers import Said, Solvers
+from avow.kernel.solvers import Reply, Solvers
 from avow.kernel.statements import Claimed, Statement, Statements
 from avow.kernel.text import Text, Untranslatable
 from avow.language.terms import And, Quantified, Quantifier
@@ -372,7 +372,7 @@ class Finder:
             answer = solver.check(*(z3.Bool(f"track{k}", context) for k in range(len(written))))
             if answer != z3.unsat:
                 if answer == z3.unknown and solver.reason_unknown() == "timeout":
-                    self.solvers.known["\n".join(lines), CERTIFICATE_STEPS] = Said.LATE
+                    self.solvers.known["\n".join(lines), CERTIFICATE_STEPS] = Reply.LATE
                 return None
             needed = {str(switch) for switch in solver.unsat_core()}
         except z3.Z3Exception:

@@ -119,12 +119,12 @@ def level(flat: Frame, folded: Folded, composed: Mapping[str, Node]) -> Frame:
     )
 
 
-Said = dict[ClauseName, Term]
+Reply = dict[ClauseName, Term]
 """The clauses of subsystems over the whole system's values, as written in the nodes inside: with `previous` and the
 like, for which the calculus uses cells."""
 
 
-def composed_node(frame: Frame, goal: Goal, face: Face, formulas: Said) -> tuple[Node, tuple[str, ...]]:
+def composed_node(frame: Frame, goal: Goal, face: Face, formulas: Reply) -> tuple[Node, tuple[str, ...]]:
     """The subsystem with its derived contract, and that contract as lines of text. Clauses are named ``camera.sharp``,
     by the node inside; their cells (``camera.once#…``) are inputs. The clauses as written are added to `formulas`."""
     flat = frame.flat if isinstance(frame, Level) else frame
@@ -166,7 +166,7 @@ def composed_node(frame: Frame, goal: Goal, face: Face, formulas: Said) -> tuple
     return node, tuple(lines)
 
 
-def _said(frame: Frame, name: ClauseName, clauses: Said) -> Term:
+def _said(frame: Frame, name: ClauseName, clauses: Reply) -> Term:
     """A clause of a node or subsystem as it was written, over the whole system's values; an unwritten one (that time
     advances) in the form that the calculus uses."""
     if name in clauses:

@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 from avow.base.files import sha256
 from avow.kernel.certificate import Certificate, Entry, Format, How, Question, Use
-from avow.kernel.solvers import LOOK, Said, Solvers
+from avow.kernel.solvers import LOOK, Reply, Solvers
 from avow.kernel.statements import Claimed, Statement, Statements
 from avow.kernel.text import Text, Untranslatable, conjunction, symbol
 from avow.language.terms import And, Quantified, Quantifier
@@ -145,7 +145,7 @@ class Kernel:
                     yield from self.begins(question.uses, question.initials)
             case How.POSSIBLE:
                 body = (text := Text()).formula(claim.term, claim.symbols())
-                yield self._asked(text.script([body]), Said.SAT, f"{claim.called}: no values are shown to be so")
+                yield self._asked(text.script([body]), Reply.SAT, f"{claim.called}: no values are shown to be so")
                 if claim.kind is Claimed.START:  # one example is not enough if the environment matters: all of it
                     firsts = [s.digest for s in self.known.every if s.kind is Claimed.INITIAL and s.node in claim.nodes]
                     yield from self.begins([use for question in entry.base for use in question.uses], firsts)
@@ -157,8 +157,8 @@ class Kernel:
             raise Refused(f"stale: {entry.node or 'the system'} has no such {entry.how} claim")
         return claim
 
-    def _asked(self, script: str, wanted: Said, otherwise: str) -> Answered:
-        if wanted is Said.SAT and (types := re.findall(r"^\(declare-sort (.*) 0\)$", script, re.MULTILINE)):
+    def _asked(self, script: str, wanted: Reply, otherwise: str) -> Answered:
+        if wanted is Reply.SAT and (types := re.findall(r"^\(declare-sort (.*) 0\)$", script, re.MULTILINE)):
             if re.search(r"\((forall|exists) \(", script):  # without quantifiers, one element represents any number
                 raise Refused(f"{otherwise}, however many elements {' and '.join(types)} may have")
             script += "".join(f"(assert (forall ((x {name}) (y {name})) (= x y)))\n" for name in types)
@@ -171,8 +171,8 @@ class Kernel:
         """`Base_valid` and `Step_valid`: no window of states meets the premises and not the claim. Raises Refused."""
         text, claim = Text(), self._claim(entry)
         premises, goal = self._question(text, claim, question, step)
-        found = self._asked(text.script([*premises, f"(not {goal})"]), Said.UNSAT, f"{claim.called} does not follow")
-        vacuous = self.solvers.first(text.script(premises), LOOK) is Said.UNSAT
+        found = self._asked(text.script([*premises, f"(not {goal})"]), Reply.UNSAT, f"{claim.called} does not follow")
+        vacuous = self.solvers.first(text.script(premises), LOOK) is Reply.UNSAT
         return Answered(found.digest, found.solvers, self._together(claim, question), vacuous)
 
     def _question(self, text: Text, claim: Statement, question: Question, step: int) -> tuple[list[str], str]:
@@ -221,12 +221,12 @@ class Kernel:
                 bound = {v: names[p.symbol()] for v, p in each.places.items() if p.symbol() in names}
                 conditions.append(text.formula(each.term, each.symbols(), bound))
             if not constant:
-                yield self._asked(text.script(conditions), Said.SAT, f"no first value of {called} is found")
+                yield self._asked(text.script(conditions), Reply.SAT, f"no first value of {called} is found")
                 continue
             begin = text.bound("exists", names.values(), [first[n] for n in names], conjunction(conditions) or "true")
             allowed = (text.formula(each.term, each.symbols(back)) for each, back in self._used(given))
             asked = text.script([*allowed, f"(not {begin})"])
-            yield self._asked(asked, Said.UNSAT, f"{called}: no first value for every constant input that is allowed")
+            yield self._asked(asked, Reply.UNSAT, f"{called}: no first value for every constant input that is allowed")
 
     def _together(self, claim: Statement, question: Question) -> tuple[str, ...]:
         """The nodes whose steps a question treats as one, if the wires do not imply that. Along a chain, where each

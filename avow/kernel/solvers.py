@@ -16,14 +16,14 @@ NET_MS = 60_000
 """A limit for work that Z3's steps do not count; it is reached only by a fault of the solver."""
 
 
-class Said(StrEnum):
+class Reply(StrEnum):
     UNSAT = "unsat"
     SAT = "sat"
     UNKNOWN = "unknown"
     LATE = "stopped by the clock"  # and not by its steps: another run may give another answer
 
 
-def ask_z3(script: str, budget: int) -> Said:
+def ask_z3(script: str, budget: int) -> Reply:
     """Z3's answer to a script within a number of its own steps; `unknown` if it cannot read the script."""
     import z3
 
@@ -32,28 +32,28 @@ def ask_z3(script: str, budget: int) -> Said:
         solver.set(rlimit=budget, timeout=NET_MS)
         solver.set("smt.arith.nl.grobner", False)  # for non-linear integer terms: they cannot be interrupted
         solver.from_string(script)
-        answer = Said(str(solver.check()))
-        return Said.LATE if answer is Said.UNKNOWN and solver.reason_unknown() == "timeout" else answer
+        answer = Reply(str(solver.check()))
+        return Reply.LATE if answer is Reply.UNKNOWN and solver.reason_unknown() == "timeout" else answer
     except z3.Z3Exception:
-        return Said.UNKNOWN
+        return Reply.UNKNOWN
 
 
 @dataclass(slots=True)
 class Solvers:
     """Each question is asked once. Both solvers may be other processes (`avow.solving.apart`)."""
 
-    z3: Callable[[str, int], Said] = ask_z3
-    second: Callable[[str], Said] | None = None
-    known: dict[tuple[str, int], Said] = field(default_factory=dict)
+    z3: Callable[[str, int], Reply] = ask_z3
+    second: Callable[[str], Reply] | None = None
+    known: dict[tuple[str, int], Reply] = field(default_factory=dict)
 
-    def ask(self, script: str, wanted: Said) -> tuple[Said, int]:
+    def ask(self, script: str, wanted: Reply) -> tuple[Reply, int]:
         """The answer; how many solvers give the wanted one: 0 if Z3 does not, or the second says the opposite."""
         if (answer := self.first(script, BUDGET)) is not wanted or self.second is None:
             return answer, int(answer is wanted)
         second = self.second(script)
-        return (second, 0) if {wanted, second} == {Said.SAT, Said.UNSAT} else (answer, 1 + (second is wanted))
+        return (second, 0) if {wanted, second} == {Reply.SAT, Reply.UNSAT} else (answer, 1 + (second is wanted))
 
-    def first(self, script: str, budget: int) -> Said:
+    def first(self, script: str, budget: int) -> Reply:
         """Z3's answer."""
         if (script, budget) not in self.known:
             self.known[script, budget] = self.z3(script, budget)

@@ -66,7 +66,7 @@ def explained(case: Case, name: str) -> Iterator[tuple[str, list[str]]]:
     yield from (told for told in identified(case, name) if not (words and told[0].startswith("the word ")))
 
 
-Told = tuple[str, list[str]]
+Explanation = tuple[str, list[str]]
 
 _DIGEST = re.compile(r"[0-9a-f]{12,64}\Z")
 _CODE = re.compile(r"[A-Z]{2,9}[0-9]{3}\Z")
@@ -75,7 +75,7 @@ _SHAPES = {"G": "goal", "S": "strategy", "Sn": "solution", "C": "context", "A": 
 _PLACE = re.compile(r"(?P<path>[^:]+):(?P<line>[0-9]+)\Z")
 
 
-def identified(case: Case, name: str) -> Iterator[Told]:
+def identified(case: Case, name: str) -> Iterator[Explanation]:
     """(heading, lines) of everything in the case that has the mark."""
     if _DIGEST.match(name):
         yield from _of_digest(case, name)
@@ -99,7 +99,7 @@ def entries(case: Case) -> Iterator[Entry]:
     yield from case.orphans
 
 
-def left_out(case: Case, records: Iterable[Entry], name: str) -> Iterator[Told]:
+def left_out(case: Case, records: Iterable[Entry], name: str) -> Iterator[Explanation]:
     """(heading, lines) of the ledger's records with that hash that the report does not quote: only the ledger has
     them."""
     if _DIGEST.match(name):
@@ -113,7 +113,7 @@ def left_out(case: Case, records: Iterable[Entry], name: str) -> Iterator[Told]:
                 )
 
 
-def _of_record(entry: Entry) -> Told:
+def _of_record(entry: Entry) -> Explanation:
     return f"record {entry.number + 1} of the ledger", [_line(entry), entry.evidence.summary]
 
 
@@ -122,7 +122,7 @@ def _line(entry: Entry) -> str:
     return f"record {entry.number + 1}: {short(e.obligation)} {Status(e.verdict).value} by {e.method}, {e.started[:16]}"
 
 
-def _of_digest(case: Case, name: str) -> Iterator[Told]:
+def _of_digest(case: Case, name: str) -> Iterator[Explanation]:
     yield from (_of_record(entry) for entry in entries(case) if entry.hash.startswith(name))
     for view in case.obligations:
         if view.obligation.digest.startswith(name):
@@ -147,7 +147,7 @@ def _of_digest(case: Case, name: str) -> Iterator[Told]:
         yield f"the content of {path}", list(_read_by(case, path))
 
 
-def _of_code(name: str) -> Iterator[Told]:
+def _of_code(name: str) -> Iterator[Explanation]:
     from avow.backend_kit.registry import every_code
 
     known = every_code().get(name)
@@ -155,7 +155,7 @@ def _of_code(name: str) -> Iterator[Told]:
         yield f"{name}: {known.title}", [line for line in (known.explanation, known.remedy) if line]
 
 
-def _of_argument(case: Case, name: str) -> Iterator[Told]:
+def _of_argument(case: Case, name: str) -> Iterator[Explanation]:
     kind = _SHAPES.get(name.rstrip("0123456789"))
     for module in argument(case) if kind is not None else ():
         for element in module.elements:
@@ -164,7 +164,7 @@ def _of_argument(case: Case, name: str) -> Iterator[Told]:
                 yield f"{kind} {name} of the argument, {module.name}", [line for line in lines if line]
 
 
-def _of_files(case: Case, name: str) -> Iterator[Told]:
+def _of_files(case: Case, name: str) -> Iterator[Explanation]:
     found = _PLACE.match(name)
     path = found["path"] if found else name
     read = list(_read_by(case, path))
@@ -184,7 +184,7 @@ def _read_by(case: Case, path: str) -> Iterator[str]:
             yield f"{how} for {len(found) - RECORDS} more records"
 
 
-def _of_contract(case: Case, name: str) -> Iterator[Told]:
+def _of_contract(case: Case, name: str) -> Iterator[Explanation]:
     for node in case.nodes:
         for clause, said in node.assumptions:
             if name in (f"{node.name}.{clause}", clause):
@@ -198,7 +198,7 @@ def _of_contract(case: Case, name: str) -> Iterator[Told]:
             yield f"{given.port}, from the environment", [line for line in lines if line]
 
 
-def _of_methods(case: Case, name: str) -> Iterator[Told]:
+def _of_methods(case: Case, name: str) -> Iterator[Explanation]:
     for method in case.methods:
         if method.name == name:
             state = "" if method.available else f"its tool is missing: {method.install}"

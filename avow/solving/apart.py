@@ -24,7 +24,7 @@ from typing import Any
 from avow.base import process
 from avow.base.tuning.effort import KERNEL_SECOND_STEPS
 from avow.base.tuning.sizes import ANSWERED_BY_ONE
-from avow.kernel.solvers import NET_MS, Said, Solvers, ask_z3
+from avow.kernel.solvers import NET_MS, Reply, Solvers, ask_z3
 
 
 class NoAnswer(Exception):  # noqa: N818 - it says what it is
@@ -43,26 +43,26 @@ class Apart:
     _asked: int = 0
     _process: subprocess.Popen[bytes] | None = None
     _lock: threading.Lock = field(default_factory=threading.Lock)
-    _known: dict[tuple[str, int], Said] = field(default_factory=dict)
+    _known: dict[tuple[str, int], Reply] = field(default_factory=dict)
 
-    def __call__(self, script: str, limit: int = KERNEL_SECOND_STEPS) -> Said:
+    def __call__(self, script: str, limit: int = KERNEL_SECOND_STEPS) -> Reply:
         """`limit`: of its own steps."""
         question = (script, limit)
         if question not in self._known:
             if self.steps <= 0:
-                return Said.UNKNOWN
+                return Reply.UNKNOWN
             self._known[question], used = self._said(script, int(min(limit, self.steps)))
             self.steps -= used
         return self._known[question]
 
-    def _said(self, script: str, limit: int) -> tuple[Said, int]:
+    def _said(self, script: str, limit: int) -> tuple[Reply, int]:
         try:
             answer, used = self.ask(script if self.solver == "z3" else f"{script}(check-sat)\n", limit, NET_MS / 1000)
-            return Said(answer or Said.UNKNOWN), used
+            return Reply(answer or Reply.UNKNOWN), used
         except TimeoutError:
-            return Said.LATE, limit
+            return Reply.LATE, limit
         except NoAnswer:
-            return Said.UNKNOWN, limit
+            return Reply.UNKNOWN, limit
 
     def ask(self, script: str, limit: int, seconds: float) -> tuple[str, int]:
         """The answer to a script (empty if it cannot be read), and the steps that it took, of `limit`. Raises NoAnswer,
@@ -135,7 +135,7 @@ class Both:
     for all questions together. `known`: answers of Z3 to be used and extended."""
 
     steps: float = math.inf
-    known: dict[tuple[str, int], Said] = field(default_factory=dict)
+    known: dict[tuple[str, int], Reply] = field(default_factory=dict)
     _started: tuple[Apart, ...] = ()
 
     def __enter__(self) -> Solvers:

@@ -144,7 +144,7 @@ class _Loaded:
             switches.append((switch, label))
         return cls(solver, tuple(switches))
 
-    def put(self, translator: Translator, on: Iterable[tuple[Expr, str]], effort: int, seed: int) -> Said:
+    def put(self, translator: Translator, on: Iterable[tuple[Expr, str]], effort: int, seed: int) -> SolverResult:
         return put(translator, self.solver, effort, seed, *(switch for switch, _ in on))
 
     def core(self) -> tuple[str, ...]:
@@ -154,7 +154,7 @@ class _Loaded:
 
 
 @dataclass(frozen=True, slots=True)
-class Said:
+class SolverResult:
     """A solver's answer, and the reason why it gave up, for people."""
 
     status: Status
@@ -164,17 +164,17 @@ class Said:
 HANGS = "the solver hangs"
 
 
-def put(translator: Sorts, solver: Any, effort: float, seed: int | None = 0, *assumptions: Expr) -> Said:
+def put(translator: Sorts, solver: Any, effort: float, seed: int | None = 0, *assumptions: Expr) -> SolverResult:
     """Check what a solver holds: every question to Z3 goes through here. Its steps bound it and are counted
     (`avow.solving.limits`); the clock only ends a call that hangs. Raises Z3Exception."""
     configured(solver, effort, seed)
     result = solver.check(*assumptions)
     charge(translator, solver)
     if result == z3.sat:
-        return Said("sat")
+        return SolverResult("sat")
     if result == z3.unsat:
-        return Said("unsat")
-    return Said("unknown", _reason(solver))
+        return SolverResult("unsat")
+    return SolverResult("unknown", _reason(solver))
 
 
 def configured(solver: Any, effort: float, seed: int | None) -> None:

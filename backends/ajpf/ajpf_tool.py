@@ -47,7 +47,7 @@ BRIEF = (*ALONE, "-XX:TieredStopAtLevel=1", "-XX:+UseSerialGC")
 """For a Java process of a second or two: light compilation, and no threads for garbage collection."""
 
 
-class Said(StrEnum):
+class AjpfResult(StrEnum):
     HOLDS = "holds"
     VIOLATED = "violated"
     INCONCLUSIVE = "inconclusive"
@@ -57,7 +57,7 @@ class Said(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    said: Said
+    said: AjpfResult
     reason: str = ""
     log: str = ""
     framework: str = ""
@@ -188,7 +188,7 @@ def check(
     try:
         done = outside.run(command, cwd=folder, seconds=seconds, env=env)
     except ToolMissing as error:
-        return Answer(Said.ERROR, str(error))
+        return Answer(AjpfResult.ERROR, str(error))
     return judge(done)
 
 
@@ -199,16 +199,16 @@ def judge(done: Completed) -> Answer:
     holds, violated = _NO_ERROR.search(text), _VIOLATED.search(text)
     once = len(_RESULTS.findall(text)) == 1  # an agent prints into the same text
     if done.timed_out:
-        result, reason = Said.TIMEOUT, f"no answer in {done.seconds:.0f} s; {ALLOWS_MORE}"
+        result, reason = AjpfResult.TIMEOUT, f"no answer in {done.seconds:.0f} s; {ALLOWS_MORE}"
     elif parser:
-        result, reason = Said.ERROR, f"AJPF's parser complained: {parser[0].strip()}"
+        result, reason = AjpfResult.ERROR, f"AJPF's parser complained: {parser[0].strip()}"
     elif "search constraint" in text:
-        result, reason = Said.INCONCLUSIVE, "a search constraint cut the search short"
+        result, reason = AjpfResult.INCONCLUSIVE, "a search constraint cut the search short"
     elif holds and once and not violated and "error #" not in text:
-        result, reason = Said.HOLDS, ""
+        result, reason = AjpfResult.HOLDS, ""
     elif violated and not holds:
-        result, reason = Said.VIOLATED, ""
+        result, reason = AjpfResult.VIOLATED, ""
     else:
-        result, reason = Said.ERROR, f"no answer that can be relied upon (exit code {done.code})"
+        result, reason = AjpfResult.ERROR, f"no answer that can be relied upon (exit code {done.code})"
     log = f"{' '.join(done.command)}\n\n{done.stdout}\n--- stderr ---\n{done.stderr}"
     return Answer(result, reason, log, framework[1].strip() if framework else "")

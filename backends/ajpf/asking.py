@@ -25,7 +25,7 @@ from avow.isolation.observed import look
 from avow.isolation.outside import Outside
 
 from . import psl
-from .ajpf_tool import Answer, Installation, Said, check, prepare
+from .ajpf_tool import AjpfResult, Answer, Installation, check, prepare
 from .checker import Property
 from .files import psl_file, system_files
 from .java import CLASS
@@ -33,7 +33,7 @@ from .options import Setup
 
 _FORM = 4
 """The version of the requests and of the reading of answers: changing it invalidates the cache."""
-_DECIDED = (Said.HOLDS, Said.VIOLATED)
+_DECIDED = (AjpfResult.HOLDS, AjpfResult.VIOLATED)
 
 
 def key(files: Mapping[str, str], formula: str, mark: str) -> str:
@@ -99,7 +99,7 @@ def _asked(
         outside = Outside((installation.tool,))
         wrong = prepare(installation, folder, given, outside)
         if wrong is not None:
-            return {p.key: Answer(Said.ERROR, wrong, observed=outside.observed()) for p in properties}
+            return {p.key: Answer(AjpfResult.ERROR, wrong, observed=outside.observed()) for p in properties}
 
         def one(p: Property) -> Answer:
             nonlocal waiting
@@ -107,7 +107,7 @@ def _asked(
                 limit = (deadline - time.monotonic()) / ceil(waiting / workers)
                 waiting -= 1
             if limit <= 1:
-                return Answer(Said.TIMEOUT, "no time left")
+                return Answer(AjpfResult.TIMEOUT, "no time left")
             return check(installation, folder, p.key, limit, max(256, megabytes // workers), outside)
 
         with ThreadPoolExecutor(workers) as pool:

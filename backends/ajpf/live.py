@@ -21,7 +21,7 @@ class Endless(RuntimeError):  # noqa: N818 - it says what the program is
     """The program neither acts nor comes to rest."""
 
 
-class _Told(World):
+class GivenPercepts(World):
     """The percepts, as they were given."""
 
     def __init__(self) -> None:
@@ -38,7 +38,7 @@ class Running:
 
     def __init__(self, path: Path | str) -> None:
         """Raises Rejected if the file is not a program."""
-        self._world = _Told()
+        self._world = GivenPercepts()
         self._agent = Agent(read_system(Path(path))[0], self._world, Semantics.MCAPL)
         self._state = self._agent.first()
 

@@ -16,7 +16,7 @@ from .terms import show
 
 
 @dataclass(frozen=True, slots=True)
-class Told:
+class NarratedStep:
     """One step of a run. `what` is a sentence; the others are texts of terms."""
 
     agent: str
@@ -41,20 +41,20 @@ class Told:
             yield f"  there is to perceive: {', '.join(self.offered) or 'nothing'}"
 
 
-def narrated(system: System, seed: int, steps: int) -> Iterator[Told]:
+def narrated(system: System, seed: int, steps: int) -> Iterator[NarratedStep]:
     """At most so many steps of one run; if the environment has a choice, the seed decides. Raises Crash, TooDeep."""
     rng = Random(seed)
     state: Any = system.start()[0]
     for _ in range(steps):
         after: Any = rng.choice(system.successors(state))
         if system.core(after).over:
-            yield Told("", "there is nothing to do: the run is over")
+            yield NarratedStep("", "there is nothing to do: the run is over")
             return
         yield _told(system, state, after)
         state = after
 
 
-def _told(system: System, state: Any, following: Any) -> Told:
+def _told(system: System, state: Any, following: Any) -> NarratedStep:
     seen = system.core(following)
     place = seen.turn
     agent, old, new = system.agents[place], system.minds(state)[place], system.minds(following)[place]
@@ -63,7 +63,7 @@ def _told(system: System, state: Any, following: Any) -> Told:
     did = system.did(following)
     if did is not None and before.planned and _deed(agent, before).startswith("does "):
         action = show(did[1])
-    return Told(
+    return NarratedStep(
         agent.program.name if len(system.agents) > 1 else "",
         _deed(agent, before) if before.planned else _choice(agent, before, after),
         tuple(map(show, system.world.drawn(seen.choice))) if seen.drawn else None,

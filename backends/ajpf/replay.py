@@ -17,7 +17,7 @@ from avow.base.process import ToolMissing
 from avow.formulas.lasso import Lasso
 from avow.isolation.outside import Outside
 
-from .ajpf_tool import BRIEF, Answer, Installation, Said, prepare
+from .ajpf_tool import BRIEF, AjpfResult, Answer, Installation, prepare
 from .asking import keep, key, recall
 from .explore import Graph, System
 from .files import system_files
@@ -116,10 +116,10 @@ def replay(
 
 def _judged(answer: Answer | None, asked: tuple[Sequence[Moment], Script], key: str) -> Answer:
     assert answer is not None
-    if answer.said is Said.ERROR:
+    if answer.said is AjpfResult.ERROR:
         return answer
     if (difference := _difference(asked[0], answer.log)) is not None:
-        return replace(answer, said=Said.VIOLATED, reason=difference)
+        return replace(answer, said=AjpfResult.VIOLATED, reason=difference)
     keep(key, answer)  # any other result may be due to the machine, and is retried
     return answer
 
@@ -159,11 +159,11 @@ def _run(
     except ToolMissing as error:
         wrong = str(error)
     if wrong is not None:
-        return tuple(Answer(Said.ERROR, wrong, observed=outside.observed()) for _ in scripts)
+        return tuple(Answer(AjpfResult.ERROR, wrong, observed=outside.observed()) for _ in scripts)
     logs = re.split(rf"^{MARK}run .*$", output, flags=re.MULTILINE)[1 : len(scripts) + 1]
     seen = outside.observed()
-    done_runs = [Answer(Said.HOLDS, log=log, observed=seen) for log in logs]
-    lost = Answer(Said.ERROR, f"Java ended before the run: {output.strip()[-200:]}", observed=seen)
+    done_runs = [Answer(AjpfResult.HOLDS, log=log, observed=seen) for log in logs]
+    lost = Answer(AjpfResult.ERROR, f"Java ended before the run: {output.strip()[-200:]}", observed=seen)
     return (*done_runs, *(lost for _ in scripts[len(logs) :]))
 
 

@@ -18,7 +18,7 @@ from avow.isolation.observed import Observed, Seen
 from avow.isolation.outside import Outside
 
 from . import ajpf_tool
-from .ajpf_tool import Installation, Said
+from .ajpf_tool import AjpfResult, Installation
 from .asking import ask
 from .beliefs import TooDeep
 from .checker import Checker, OutOfTime, Property, asks_for_percepts
@@ -34,11 +34,11 @@ from .words import Wording, explain
 ENGINE = "Avow's own Gwendolen checker"
 
 _SAID = {
-    Said.HOLDS: Verdict.CHECKED,
-    Said.VIOLATED: Verdict.REFUTED,
-    Said.INCONCLUSIVE: Verdict.UNKNOWN,
-    Said.TIMEOUT: Verdict.UNKNOWN,
-    Said.ERROR: Verdict.ERROR,
+    AjpfResult.HOLDS: Verdict.CHECKED,
+    AjpfResult.VIOLATED: Verdict.REFUTED,
+    AjpfResult.INCONCLUSIVE: Verdict.UNKNOWN,
+    AjpfResult.TIMEOUT: Verdict.UNKNOWN,
+    AjpfResult.ERROR: Verdict.ERROR,
 }
 
 
@@ -191,14 +191,14 @@ class _Run:
             answers = replay(ajpf, self.setup, [run for _, run in runs], Path(folder), outside)
         agreed = 0
         for (key, _), answer in zip(runs, answers, strict=True):
-            if answer.said is Said.ERROR:
+            if answer.said is AjpfResult.ERROR:
                 self.unanswered(answer.observed)
                 self.bound["replay"] = f"not replayed by {name}: {answer.reason}"
                 return
             self.observed.update(dict.fromkeys(answer.observed))
             if key:
                 self.logs[f"{key}.replay.txt"] = answer.log
-            if answer.said is Said.VIOLATED:
+            if answer.said is AjpfResult.VIOLATED:
                 reason = f"contradictory: {name} does not do {_of(key)}: {answer.reason}"
                 self.results = {
                     each: replace(r, verdict=Verdict.ERROR, reason=reason) for each, r in self.results.items()
@@ -237,9 +237,9 @@ class _Run:
             answer = answers[p.key]
             if answer.log:
                 self.logs[f"{p.key}.ajpf.txt"] = answer.log
-            if answer.said is Said.VIOLATED and self.setup.environment.fair:
+            if answer.said is AjpfResult.VIOLATED and self.setup.environment.fair:
                 reason = "AJPF knows no fairness: a run on which it fails may be unfair"
-                answer = replace(answer, said=Said.INCONCLUSIVE, reason=reason)
+                answer = replace(answer, said=AjpfResult.INCONCLUSIVE, reason=reason)
             own = self.results[p.key]
             verdict, reason = self.judged(p, _SAID[answer.said], own.refutes and own.answer is not None)
             opinions = {} if own.answer is None else {ENGINE: str(own.answer)}

@@ -18,7 +18,7 @@ from typing import Any
 
 from avow.backend_kit.given import summarized
 from avow.backend_kit.programs.callbacks import SECOND, Driver, Event, Run, Silent, driver
-from avow.backend_kit.programs.cpython import Told
+from avow.backend_kit.programs.cpython import Replies
 from avow.backend_kit.protocol import Backend, Job, JudgedRun, Limits, Report
 from avow.backend_kit.registry import judge_of_runs
 from avow.base.diagnostics import Diagnostic, Rejected
@@ -176,7 +176,7 @@ class _Work:
         self.keep(how)
         return found
 
-    def keep(self, how: Told) -> None:
+    def keep(self, how: Replies) -> None:
         self.observed.update(dict.fromkeys(how.observed))
         self.isolation = min(self.isolation, how.isolation, key=lambda level: level.rank)
 

@@ -11,7 +11,7 @@ from small_agents import case
 
 from avow.backend_kit.protocol import Limits
 from avow.backends.ajpf import BACKEND, ajpf_tool, files, replay
-from avow.backends.ajpf.ajpf_tool import Said, judge
+from avow.backends.ajpf.ajpf_tool import AjpfResult, judge
 from avow.backends.ajpf.asking import ask, keep, recall
 from avow.backends.ajpf.checker import Checker, Property, asks_for_percepts
 from avow.backends.ajpf.environment import read_environment
@@ -43,21 +43,21 @@ def completed(stdout="", stderr="", code=0):
 @pytest.mark.parametrize(
     ("done", "said"),
     [
-        (completed(HOLDS), Said.HOLDS),
-        (completed(VIOLATED, PATH), Said.VIOLATED),
-        (completed(""), Said.ERROR),
-        (completed("no errors detected"), Said.ERROR),
-        (completed(HOLDS + VIOLATED), Said.ERROR),
-        (completed(HOLDS + "[an agent printed that]\n" + HOLDS), Said.ERROR),
-        (completed(HOLDS + RESULTS), Said.ERROR),
-        (completed(RESULTS + "error #1: gov.nasa.jpf.vm.NoUncaughtExceptionsProperty"), Said.ERROR),
-        (completed(HOLDS + "error #1: gov.nasa.jpf.vm.NoUncaughtExceptionsProperty"), Said.ERROR),
-        (completed(HOLDS, "line 1:14 mismatched input '<>' expecting '('"), Said.ERROR),
-        (completed(HOLDS, "line 1:3 extraneous input ')'"), Said.ERROR),
-        (completed(HOLDS, "line 13:0 missing RR_NEWLINE at ':Initial Goals:'"), Said.HOLDS),
-        (completed("search constraint: depth\n" + HOLDS), Said.INCONCLUSIVE),
-        (completed(HOLDS, code=None), Said.TIMEOUT),
-        (completed("Exception in thread main", code=0), Said.ERROR),
+        (completed(HOLDS), AjpfResult.HOLDS),
+        (completed(VIOLATED, PATH), AjpfResult.VIOLATED),
+        (completed(""), AjpfResult.ERROR),
+        (completed("no errors detected"), AjpfResult.ERROR),
+        (completed(HOLDS + VIOLATED), AjpfResult.ERROR),
+        (completed(HOLDS + "[an agent printed that]\n" + HOLDS), AjpfResult.ERROR),
+        (completed(HOLDS + RESULTS), AjpfResult.ERROR),
+        (completed(RESULTS + "error #1: gov.nasa.jpf.vm.NoUncaughtExceptionsProperty"), AjpfResult.ERROR),
+        (completed(HOLDS + "error #1: gov.nasa.jpf.vm.NoUncaughtExceptionsProperty"), AjpfResult.ERROR),
+        (completed(HOLDS, "line 1:14 mismatched input '<>' expecting '('"), AjpfResult.ERROR),
+        (completed(HOLDS, "line 1:3 extraneous input ')'"), AjpfResult.ERROR),
+        (completed(HOLDS, "line 13:0 missing RR_NEWLINE at ':Initial Goals:'"), AjpfResult.HOLDS),
+        (completed("search constraint: depth\n" + HOLDS), AjpfResult.INCONCLUSIVE),
+        (completed(HOLDS, code=None), AjpfResult.TIMEOUT),
+        (completed("Exception in thread main", code=0), AjpfResult.ERROR),
     ],
 )
 def test_answers_are_read_from_the_text_never_from_the_exit_code(done, said):
@@ -233,7 +233,7 @@ def test_ajpf_agrees_on_small_agents(tmp_path, seed):
     for p in wanted:
         graph = explore(system(program, draws, Semantics.MCAPL, probed=asks_for_percepts(p)), states=5_000)
         assert graph.unfinished is None
-        expected = Said.HOLDS if Checker(graph, (p,)).check(p).holds else Said.VIOLATED
+        expected = AjpfResult.HOLDS if Checker(graph, (p,)).check(p).holds else AjpfResult.VIOLATED
         assert answers[p.key].said is expected, answers[p.key].log
         assert answers[p.key].framework
 
@@ -302,4 +302,6 @@ def test_ail_does_sampled_runs_as_our_interpreter_does(tmp_path, seed):
         folder = tmp_path / str(faulty)
         folder.mkdir()
         answers = replay.replay(installation, setup, runs, folder, Outside((installation.tool,)))
-        assert {a.said for a in answers} == ({Said.VIOLATED} if faulty else {Said.HOLDS}), [a.reason for a in answers]
+        assert {a.said for a in answers} == ({AjpfResult.VIOLATED} if faulty else {AjpfResult.HOLDS}), [
+            a.reason for a in answers
+        ]

@@ -23,7 +23,7 @@ from avow.evidence.ledger import Ledger
 from avow.evidence.signing import Signed, signature_path, verify_signature
 from avow.isolation.observed import Observed
 from avow.kernel.certificate import Certificate
-from avow.kernel.solvers import Said
+from avow.kernel.solvers import Reply
 
 
 class Colour(StrEnum):
@@ -131,7 +131,7 @@ def test_what_was_stored_reads_back_and_is_written_the_same(tmp_path: Path) -> N
     assert to_json(from_json(tuple[Observed, ...], stored["observed"])) == stored["observed"]
     answers = KeptAnswers.read(stored["answers"])
     assert answers.written() == stored["answers"]
-    assert answers.before == {"m1": (("A1", "G2"), False), "m2": Said.UNSAT}
+    assert answers.before == {"m1": (("A1", "G2"), False), "m2": Reply.UNSAT}
     index = tmp_path / "heads.jsonl"
     index.write_text("".join(f"{line}\n" for line in stored["index"]))
     found = read_index(index)

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from avow.kernel.solvers import BUDGET, Said
+from avow.kernel.solvers import BUDGET, Reply
 from avow.solving.apart import Apart
 
 NEVER = "(declare-fun x () Int)\n(assert (and (> x 0) (< x 1)))\n"
@@ -32,25 +32,25 @@ def acting(solver: Apart, shell: str) -> None:
 
 
 def test_it_answers_again_after_it_was_killed(solver: Apart) -> None:
-    assert solver(NEVER, BUDGET) is Said.UNSAT
+    assert solver(NEVER, BUDGET) is Reply.UNSAT
     process = solver._process
     assert process is not None
     process.kill()
     process.wait()
-    assert solver(EVER, BUDGET) is Said.SAT
+    assert solver(EVER, BUDGET) is Reply.SAT
 
 
 @pytest.mark.parametrize("shell", ["kill -SEGV $$", "echo unsat", "echo '[\"unsat\"]'"])
 def test_a_crash_or_the_answer_to_another_question_is_unknown(solver: Apart, shell: str) -> None:
     acting(solver, f"read line; {shell}")
-    assert solver(NEVER, BUDGET) is Said.UNKNOWN
+    assert solver(NEVER, BUDGET) is Reply.UNKNOWN
 
 
 def test_a_fork_does_not_read_the_answers_of_the_process_that_it_is_a_fork_of(solver: Apart) -> None:
     acting(solver, "while read line; do echo unsat; done")
     theirs = solver._process
     solver._owner = -1
-    assert solver(EVER, BUDGET) is Said.SAT
+    assert solver(EVER, BUDGET) is Reply.SAT
     assert theirs is not None
     assert theirs.poll() is None
     theirs.kill()
@@ -61,6 +61,6 @@ def test_one_that_hangs_is_ended(solver: Apart, monkeypatch: pytest.MonkeyPatch)
     monkeypatch.setattr("avow.solving.apart.NET_MS", 100)
     acting(solver, "read line; sleep 60")
     hanging = solver._process
-    assert solver(NEVER, BUDGET) is Said.LATE
+    assert solver(NEVER, BUDGET) is Reply.LATE
     assert hanging is not None
     assert hanging.poll() is not None

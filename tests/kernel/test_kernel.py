@@ -20,7 +20,7 @@ from avow.calculus.discharge import Bounds
 from avow.calculus.finder import Hint
 from avow.kernel.certificate import Certificate, Entry, How, Question, Use
 from avow.kernel.check import Established, Kernel, Refused
-from avow.kernel.solvers import BUDGET, Said, Solvers, ask_z3
+from avow.kernel.solvers import BUDGET, Reply, Solvers, ask_z3
 from avow.kernel.statements import Claimed
 from avow.kernel.text import Text
 from avow.language.load import check_text
@@ -144,17 +144,17 @@ def test_where_the_second_solver_says_the_opposite_nothing_is_established(tmp_pa
     certificates, certificate = made(tmp_path)
     certificates.solvers = Solvers(second=lambda script: ask_z3(script, BUDGET))
     assert established(certificates, certificate).solvers == 2
-    for said in (Said.UNKNOWN, Said.LATE):
+    for said in (Reply.UNKNOWN, Reply.LATE):
         certificates.solvers = Solvers(second=lambda _, said=said: said)  # type: ignore[misc]
         assert established(certificates, certificate).solvers == 1
-    certificates.solvers = Solvers(second=lambda _: Said.SAT)
+    certificates.solvers = Solvers(second=lambda _: Reply.SAT)
     with pytest.raises(Refused, match="does not follow: sat"):
         established(certificates, certificate)
 
 
 def test_what_the_clock_has_ended_is_an_error_that_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Not `unknown`, which would be another answer on a quicker machine."""
-    monkeypatch.setattr("avow.calculus.composition.ask_once", lambda *_: Said.LATE)
+    monkeypatch.setattr("avow.calculus.composition.ask_once", lambda *_: Reply.LATE)
     found = outcomes(make(tmp_path, LOOP, PLAN))
     for name in ("whole.a.low", "R"):
         assert found[name].verdict is Verdict.ERROR
@@ -232,7 +232,7 @@ def test_its_text_says_what_the_other_translation_says(formula: str) -> None:
     body = written.formula(term, lambda v: (f"|{v.name}~0|", v.sort))
     script = written.script([f"(not {body})"])
     mine, theirs = ask_z3(script, BUDGET), entails({}, term, effort=5_000).verdict
-    assert {"proved": Said.UNSAT, "refuted": Said.SAT}.get(theirs, mine) is mine, formulas_script([term])
+    assert {"proved": Reply.UNSAT, "refuted": Reply.SAT}.get(theirs, mine) is mine, formulas_script([term])
 
 
 CIRCLE = node(

@@ -9,7 +9,7 @@ import pytest
 from drawn.contracts import Strange, small_contract
 
 from avow.formulas.formula import negation
-from avow.kernel.solvers import Said, ask_z3
+from avow.kernel.solvers import Reply, ask_z3
 from avow.kernel.text import Text, Untranslatable
 from avow.language.load import check_text
 from avow.language.terms import Term
@@ -17,7 +17,7 @@ from avow.solving.apart import Apart
 from avow.solving.questions import solve
 
 STEPS = 1_000_000
-NAMED = {"sat": Said.SAT, "unsat": Said.UNSAT}
+NAMED = {"sat": Reply.SAT, "unsat": Reply.UNSAT}
 
 
 def terms(text: str) -> Iterator[Term]:
@@ -39,12 +39,12 @@ def compare(term: Term, told: Counter[str], second: Apart | None = None) -> None
     except Untranslatable:
         told["no text"] += 1
         return
-    theirs = NAMED.get(solve([term], effort=1_500).status, Said.UNKNOWN)
-    assert {mine, theirs} != {Said.SAT, Said.UNSAT}, question
+    theirs = NAMED.get(solve([term], effort=1_500).status, Reply.UNKNOWN)
+    assert {mine, theirs} != {Reply.SAT, Reply.UNSAT}, question
     told[f"{mine}"] += 1
-    if second is not None and mine is not Said.UNKNOWN:
+    if second is not None and mine is not Reply.UNKNOWN:
         said = second(question, 1_000)
-        assert {mine, said} != {Said.SAT, Said.UNSAT}, question
+        assert {mine, said} != {Reply.SAT, Reply.UNSAT}, question
         told[f"second {said}"] += 1
 
 

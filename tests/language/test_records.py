@@ -15,7 +15,7 @@ from avow.formulas.formula import conjunction, digest, sort_digest
 from avow.formulas.tuples import untupled
 from avow.formulas.values import Element, Value
 from avow.formulas.written import value_term
-from avow.kernel.solvers import BUDGET, Said, ask_z3
+from avow.kernel.solvers import BUDGET, Reply, ask_z3
 from avow.kernel.text import Text
 from avow.language.contract import Contract
 from avow.language.format import format_text
@@ -136,7 +136,7 @@ def test_evaluation_and_the_solver_agree(seed: int) -> None:
         assert answer.status == ("sat" if expected else "unsat")
         here = conjunction((about, *(Compare("==", v, value_term(x, v.sort)) for v, x in values.items())))
         body = (text := Text()).formula(here, lambda v: (f"|{v.name}~0|", v.sort))
-        assert ask_z3(text.script([body]), BUDGET) is (Said.SAT if expected else Said.UNSAT)
+        assert ask_z3(text.script([body]), BUDGET) is (Reply.SAT if expected else Reply.UNSAT)
         apart = untupled({(True, "it"): about}, inputs)
         assert apart is not None
         put = {leaf: term for v in inputs for leaf, term in _leaves(apart.parts[v], values[v])}

@@ -16,7 +16,7 @@ from avow.calculus.composition import Composition, compose
 from avow.calculus.entailment import KeptAnswers, keeping
 from avow.calculus.obligations import reestablished
 from avow.evidence.ledger import ledger_of
-from avow.kernel.solvers import Said
+from avow.kernel.solvers import Reply
 from avow.pipeline.discharge import discharge
 from avow.pipeline.dispatch import _earlier, read_answers
 from avow.pipeline.recheck import still_counts
@@ -122,7 +122,7 @@ def test_a_lie_that_was_kept_proves_nothing(tmp_path: Path, monkeypatch: pytest.
     composition = compose(system)
     with monkeypatch.context() as patch:
         patch.setattr(entailment, "_implied", lambda *_: Entailment(Verdict.PROVED, needed=("n0.g0",)))
-        patch.setattr(KeptAnswers, "find", lambda *_: Said.UNSAT)
+        patch.setattr(KeptAnswers, "find", lambda *_: Reply.UNSAT)
         with keeping(KeptAnswers()):
             outcomes = settle_all(composition, all_obligations(composition), Limits(seconds=20))
     lied = next(o for o in outcomes if o.obligation.endswith("whole.n1.a0"))

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from avow.backend_kit.programs.cpython import Subject, Told, ask
+from avow.backend_kit.programs.cpython import Replies, Subject, ask
 from avow.backend_kit.programs.samples import Pool, leaves, numbers_of, pool, written
 from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.base.files import inside, read_text
@@ -131,7 +131,7 @@ class Driver:
             raise _refused(self.source, f"{self.source.class_name} publishes otherwise when it is run again")
         return first[0]
 
-    def runs(self, given: Sequence[Given]) -> tuple[tuple[Run, ...], Told]:
+    def runs(self, given: Sequence[Given]) -> tuple[tuple[Run, ...], Replies]:
         """Runs with a new object each, in one process, each in one of the possible orders of its callbacks; also
         returns its isolation. Raises Rejected likewise."""
         return _runs(self.source, self.subject, given, orders=True)
@@ -245,7 +245,7 @@ def driver(system: System, name: str) -> Driver:
 
 def _runs(
     source: Source, subject: Subject, given: Sequence[Given], *, quiet: bool = False, orders: bool = False
-) -> tuple[tuple[Run, ...], Told]:
+) -> tuple[tuple[Run, ...], Replies]:
     """Runs in a separate process. `quiet`: only subscriptions and publications."""
     asked = [
         json.dumps({"start": start, "end": end, "orders": orders, "events": [[e.topic, e.at, e.data] for e in events]})

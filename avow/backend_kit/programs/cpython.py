@@ -61,7 +61,7 @@ class Question:
 
 
 @dataclass(frozen=True, slots=True)
-class Told:
+class Replies:
     """The replies, one for each case (None: no reply), or a `fault`, in which case no reply counts."""
 
     replies: tuple[Any, ...]
@@ -84,7 +84,7 @@ def case_of(inputs: Mapping[str, Any], memory: Mapping[str, Any]) -> str:
     )
 
 
-def ask(subject: Subject, cases: Sequence[str], *, seconds: float, megabytes: int) -> Told:
+def ask(subject: Subject, cases: Sequence[str], *, seconds: float, megabytes: int) -> Replies:
     """Run the cases, each on an object of its own. Raises ToolMissing."""
     from avow.base.tuning.running import SUBJECT_BATCH
 
@@ -94,7 +94,7 @@ def ask(subject: Subject, cases: Sequence[str], *, seconds: float, megabytes: in
         question = Question(*where, tuple(cases), seconds, SUBJECT_BATCH)
         place.write_text(canonical(to_json(question)), encoding="utf-8")
         done, answer = judge.ask(
-            Told,
+            Replies,
             str(Path(__file__).resolve()),
             [str(place)],
             cwd=Path(scratch),
@@ -106,7 +106,7 @@ def ask(subject: Subject, cases: Sequence[str], *, seconds: float, megabytes: in
         why = "took too long" if done.timed_out else f"ended without an answer (code {done.code})"
         last = done.stderr.strip().splitlines()[-1:]
         fault = f"running the class {why}{': ' + last[0][:200] if last else ''}"
-        return Told((), fault, (), Isolation.NONE, silent=True)
+        return Replies((), fault, (), Isolation.NONE, silent=True)
     return replace(answer, replies=tuple(json.loads(r) if isinstance(r, str) else r for r in answer.replies))
 
 
@@ -133,7 +133,9 @@ def main() -> None:
             replies += found
     finally:
         fault = process.close() or fault
-    made = Told(tuple(replies), fault, process.observed(), process.isolation, bool(process.fault), bool(process.silent))
+    made = Replies(
+        tuple(replies), fault, process.observed(), process.isolation, bool(process.fault), bool(process.silent)
+    )
     judge.say(channel, made)
 
 
