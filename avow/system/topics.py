@@ -19,10 +19,10 @@ from avow.language.contract import Clause, ClauseKind, Contract, Node, Port, Top
 from avow.language.sorts import BOOL, FunctionSort
 from avow.language.terms import Apply, Compare, Iff, Or, Quantified, Quantifier, Role, Term, Variable
 from avow.ros.calls import CALL_PARTS, part_topic
-from avow.ros.definitions import Array, Definitions, Nested, canonical
+from avow.ros.definitions import HEADER, Array, Definitions, Nested, canonical
 from avow.ros.names import Resolver
 from avow.ros.sources import definitions
-from avow.system.plan import Edge, Endpoint, Plan
+from avow.system.plan import Driving, Edge, Endpoint, Plan
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,8 +96,12 @@ def wrong_types(found: Ends) -> Iterator[Diagnostic]:
 
 def unknown_types(plan: Plan, contract: Contract) -> Iterator[Diagnostic]:
     """Topics whose messages' type is not defined, though the plan says where types are defined: a typing error in the
-    name, or a service or an action without the part of a call that is meant. Faults in the definitions, too."""
-    if plan.ros.distro is None and not plan.messages:
+    name, or a service or an action without the part of a call that is meant. Faults in the definitions, too. An error
+    for a node whose class is driven by its callbacks: it cannot run without its types."""
+    driven = {entry.node for entry in plan.nodes if entry.source and entry.source.kind != Driving.STEP}
+    needed = {canonical(topic.ros_type) for node in contract.nodes if node.name in driven for topic in node.topics}
+    needed = {kind for kind in needed if kind != HEADER and not kind.startswith("builtin_interfaces/")}
+    if plan.ros.distro is None and not plan.messages and not needed:
         return
     known, wrong = definitions(plan.messages, plan.ros.distro)
     yield from wrong
@@ -105,7 +109,7 @@ def unknown_types(plan: Plan, contract: Contract) -> Iterator[Diagnostic]:
     missing: set[str] = set()
     asked = [(canonical(topic.ros_type), topic.span, topic.name) for node in contract.nodes for topic in node.topics]
     for kind, span, name in () if wrong else (*asked, *_parts_of(known, {kind for kind, _, _ in asked})):
-        if kind in known.messages:
+        if kind in known.messages or (plan.ros.distro is None and not plan.messages and kind not in needed):
             continue
         parts = [part for part in (f"{kind}_{end}" for end in CALL_PARTS) if part in known.messages]
         if parts:
@@ -120,12 +124,15 @@ def unknown_types(plan: Plan, contract: Contract) -> Iterator[Diagnostic]:
         if package not in packages:
             near[:0] = (f"{other}/{word}" for other in nearest(package, packages, alike=0.75))
             text = f"neither `messages` nor the distribution has the package {package}, of {kind}"
-        if package in packages or (plan.messages and package not in missing):  # one warning for a missing package
+        if package in packages or ((plan.messages or kind in needed) and package not in missing):  # one a package
             meant = f"did you mean `{near[0]}`?" if near else suggest(word, own) or ""
             hint = f"{meant} If not, add its definition (`{package}/msg/….msg`) under `messages`".removeprefix(
                 " If not, "
             )
-            yield Diagnostic("ROS104", text, span, Severity.WARNING, hint)
+            if kind in needed:
+                yield Diagnostic("DRIVE101", f"{text}: its class cannot be driven", span, hint=hint)
+            else:
+                yield Diagnostic("ROS104", text, span, Severity.WARNING, hint)
         missing |= {package} - packages
 
 

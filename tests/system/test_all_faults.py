@@ -283,3 +283,11 @@ def test_a_folder_of_messages_with_a_slip_in_its_name_is_told(tmp_path: Path) ->
     (tmp_path / "plan.yaml").write_text("messages: [msg]\nros: {distro: humble}", encoding="utf-8")
     (found,) = (d for d in of_plan(load_system(tmp_path)) if d.code == "ROS104")
     assert "did you mean `rover_msg/Zone`?" in str(found.hint)
+    assert not found.is_error
+    (tmp_path / "n.py").write_text("class N: pass\n", encoding="utf-8")
+    for ros in ("", "ros: {distro: humble}\n"):  # a driven class cannot run without its types
+        source = "nodes: {a: {source: {python: n.py, class: N, kind: rclpy}}}"
+        (tmp_path / "plan.yaml").write_text(ros + source, encoding="utf-8")
+        (found,) = (d for d in of_plan(load_system(tmp_path)) if d.code == "DRIVE101")
+        assert found.is_error
+        assert "under `messages`" in str(found.hint)
