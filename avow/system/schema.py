@@ -172,7 +172,8 @@ def _explain(error: Any, root: Piece, whole: str, also: Iterable[Any] = ()) -> I
             if len(allowed) == 1:
                 yield fault(f"{allowed[0]} is wanted, not {given}{wanted}", hint=f"write `{allowed[0]}`")
                 return
-            hint = suggest(error.instance, allowed) if isinstance(error.instance, str) else None
+            word = _VERSIONS.get(str(error.instance), error.instance)
+            hint = f"write `{word}`" if word in allowed else suggest(word, allowed) if isinstance(word, str) else None
             yield fault(f"{given} is not one of {', '.join(allowed)}", hint=hint)
         case "type":
             kinds = error.validator_value if isinstance(error.validator_value, list) else [error.validator_value]
@@ -257,6 +258,9 @@ def _alternatives(schemas: Iterable[Any]) -> str:
         said += words or [" with ".join(repr(key) for key in schema.get("required", []))]
     return " or ".join(dict.fromkeys(said))
 
+
+_VERSIONS = {"ros1": "rospy", "ros2": "rclpy"}
+"""A version of ROS → its kind of class."""
 
 _KINDS = {
     "object": "a mapping",

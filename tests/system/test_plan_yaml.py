@@ -174,6 +174,9 @@ def test_an_alias_without_its_anchor_has_a_remedy(tmp_path: Path) -> None:
 def test_did_you_mean(tmp_path: Path) -> None:
     (fault,) = faults(tmp_path, "conections: []\n")
     assert fault.hint == "did you mean `connections`?"
+    source = "nodes: {n: {source: {python: n.py, class: N, kind: KIND}}}"
+    for kind, hint in (("ros2", "write `rclpy`"), ("ros1", "write `rospy`"), ("rclpi", "did you mean `rclpy`?")):
+        assert faults(tmp_path, source.replace("KIND", kind))[0].hint == hint
 
 
 def test_billion_laughs_is_bounded() -> None:
