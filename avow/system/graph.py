@@ -205,7 +205,11 @@ def _by_topics(nodes: Sequence[Node], taken: Collection[Endpoint], found: Ends, 
                 if fits(output.sort, port.sort):
                     edges.append(Edge(at, target, implied=True, span=port.span))
                 else:
-                    faults.append(_other_type(at, output, target, port, carrier))
+                    meant = Endpoint(at.node, port.name)
+                    apart = "" if named else ", ".join(c.topic for c in found.outputs.get(meant, ()))
+                    faults.append(
+                        _other_type(at, output, target, port, carrier, f"{meant} is on {apart}" * bool(apart))
+                    )
             elif chosen:
                 faults.append(_several(target, [at.node for at, _ in chosen], port))
             elif others:
@@ -219,9 +223,11 @@ def _own_topic(target: Endpoint, source: Endpoint, carrier: Carrier) -> Diagnost
     return Diagnostic("ROS114", message, carrier.span, hint=hint)
 
 
-def _other_type(at: Endpoint, output: Port, target: Endpoint, port: Port, carrier: Carrier) -> Diagnostic:
+def _other_type(at: Endpoint, output: Port, target: Endpoint, port: Port, carrier: Carrier, apart: str) -> Diagnostic:
+    """`apart`: where the output of the input's name is instead."""
     message = f"{carrier.topic} links {at} ({output.type_name}) and {target} ({port.type_name}): other types"
-    return Diagnostic("PLAN121", message, carrier.span, hint="give both ports one type, or remap one of them")
+    hint = f"{apart}: correct its topic, or remap it" if apart else "give both ports one type, or remap one of them"
+    return Diagnostic("PLAN121", message, carrier.span, hint=hint)
 
 
 def _which(target: Endpoint, others: Sequence[tuple[Endpoint, Port]], carrier: Carrier, found: Ends) -> Diagnostic:

@@ -117,6 +117,14 @@ def test_what_does_not_fit_is_told(tmp_path: Path, text: str, plan: str, codes: 
     assert told(tmp_path, text, plan) == codes
 
 
+def test_an_output_on_another_topic_than_the_input_of_its_name(tmp_path: Path) -> None:
+    """The output that is on the topic has another type; the port that is meant is named."""
+    topics = "std_msgs/Float64 /t matches(out.x), std_msgs/Float64 /u matches(out.y)"
+    with pytest.raises(Rejected) as caught:
+        dataflow(make(tmp_path, node("a", "", "x : BOOL, y : REAL", topics) + sink()))
+    assert [d.hint for d in caught.value.diagnostics] == ["a.y is on /u: correct its topic, or remap it"]
+
+
 def test_a_slip_in_one_type_of_three(tmp_path: Path) -> None:
     text = SOURCE.replace("std_msgs/Float64", "p/Vacum") + "".join(
         node(name, "y : REAL", "", "p/Vacuum t matches(in.y)") for name in "bc"
