@@ -8,6 +8,7 @@ from pathlib import Path
 
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.records import dataclass
+from avow.base.suggestions import suggest
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,12 +121,8 @@ def system_folder(name: str) -> Path:
     if folder is not None:
         return folder
     found = find_workspace(Path.cwd().resolve())
-    known = ", ".join(p.name for p in found.systems()) if found else ""
-    raise Rejected(
-        Diagnostic(
-            "CLI002", f"there is no system '{name}'", hint=f"known here: {known}" if known else "give its folder"
-        )
-    )
+    hint = suggest(Path(name).name, [p.name for p in found.systems()] if found else ())
+    raise Rejected(Diagnostic("CLI002", f"there is no system '{name}'", hint=hint or "give its folder"))
 
 
 def report_folder(given: Path) -> Path:
@@ -148,7 +145,7 @@ def require_systems(place: Workspace, names: Iterable[str]) -> tuple[str, ...]:
     found = tuple(name_of(place, name) for name in names)
     for name in found:
         if name not in known:
-            raise Rejected(Diagnostic("CLI002", f"there is no system '{name}'", hint=f"known: {', '.join(known)}"))
+            raise Rejected(Diagnostic("CLI002", f"there is no system '{name}'", hint=suggest(Path(name).name, known)))
     return found
 
 

@@ -12,6 +12,7 @@ from pathlib import Path
 
 from avow.base.diagnostics import Diagnostic, Rejected, Severity, Span
 from avow.base.remembered import Shelf
+from avow.base.suggestions import nearby
 from avow.base.tuning.sizes import CONTRACT_BYTES, CONTRACTS_KEPT
 from avow.language.checker import Checker
 from avow.language.contract import Contract, Node
@@ -91,7 +92,7 @@ def read_source(path: Path) -> Source | Diagnostic:
         with path.open("rb") as stream:
             data = stream.read(CONTRACT_BYTES + 1)
     except OSError as error:
-        return Diagnostic("RCL002", f"the file cannot be read: {error.strerror or error}", start)
+        return Diagnostic("RCL002", f"the file cannot be read: {error.strerror or error}", start, hint=nearby(path))
     except ValueError:  # a NUL in the name
         return Diagnostic("RCL002", "the file cannot be read: its name is not a file name", start)
     return decode(data, file)

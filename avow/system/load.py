@@ -7,6 +7,7 @@ from pathlib import Path
 
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.remembered import Shelf
+from avow.base.suggestions import nearby
 from avow.base.tuning.sizes import SYSTEMS_WITHIN
 from avow.language.contract import Contract
 from avow.system.faults import every_fault
@@ -45,7 +46,9 @@ def _load(folder: Path, within: tuple[Path, ...], known: dict[Path, System], she
             hint = "mend the link, or give the plan's text a file of its own"
             raise Rejected(Diagnostic("PLAN100", f"{path} is a link that leads nowhere", hint=hint))
         if path.exists() or not folder.is_dir():
-            raise Rejected(Diagnostic("PLAN100", f"there is no folder {folder} with a {PLAN_FILE}"))
+            raise Rejected(
+                Diagnostic("PLAN100", f"there is no folder {folder} with a {PLAN_FILE}", hint=nearby(folder))
+            )
         files = sorted(folder.glob("*.rcl"))
         if not files:
             raise Rejected(Diagnostic("PLAN100", f"{folder} holds neither a {PLAN_FILE} nor an .rcl file"))

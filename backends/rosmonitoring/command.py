@@ -20,9 +20,9 @@ from avow.backend_kit.timeline import picture
 from avow.base.codec import document
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.plain import listed
-from avow.base.workspace import system_folder
+from avow.base.workspace import named_folder, system_folder
 from avow.ros.bags import digest_trace
-from avow.system.load import load_system
+from avow.system.load import PLAN_FILE, load_system
 from avow.system.plan import System
 
 from .configuration import of_system
@@ -84,6 +84,9 @@ def command(
     running graph. Code 1 if something was broken or nothing could be judged, 2 if an input cannot be used.
     """
 
+    swapped = named_folder(Path(trace)) if trace is not None and not Path(trace).is_file() else None
+    if swapped is not None and (swapped / PLAN_FILE).is_file():
+        raise click.UsageError(f"{trace} is a system, and no TRACE: SYSTEM comes first")
     loaded = load_system(system_folder(system))
     output = _Output(as_json, show_all, timeline, mcap)
     files = [path.resolve() for path in (record, timeline, mcap, configuration) if path is not None]

@@ -224,6 +224,7 @@ def test_what_cannot_be_is_refused(
         ((str(trace), "--mcap", str(trace)), "two of the files are one"),
         ((str(trace), "--timeline", str(tmp_path / "x"), "--mcap", str(tmp_path / "x")), "two of the files are one"),
         ((str(trace), "--mcap", str(tmp_path)), "MON304"),
+        ((str(tmp_path),), "SYSTEM comes first"),
         (("--live", "ros1", "--record", str(tmp_path / "x.mcap")), "--record writes JSON lines, not .mcap"),
         (("--serve", "0", "--mcap", str(tmp_path / "x.mcap")), "--mcap needs a TRACE or --live"),
     ):
