@@ -276,8 +276,9 @@ def reason_wanted(name: str) -> str:
         return "say what a delayed edge of the loop carries first: `connections: [{…, delayed: true, initial: …}]`"
     if name.startswith("environment."):
         about = name.removeprefix("environment.")
-        key = about if about.startswith("in.") else f"{about.partition('.')[0]}.INPUT"
-        return f"say what is assumed of the input, and why: `environment: {{{key}: {{assume: …, because: …}}}}`"
+        key = about if about.startswith("in.") else f"{about.partition('.')[0]}.PORT"
+        port = "" if about == key else ", with PORT its input"
+        return f"say what is assumed of the input{port}, and why: `environment: {{{key}: {{assume: …, because: …}}}}`"
     key = "entered" if key.startswith(("loop.", "loop-of.")) else key.replace("-", "_")
     return f"give a reason in the plan: `compose: {{{goal}: {{{key}: {{because: …}}}}}}`"
 

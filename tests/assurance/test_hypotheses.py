@@ -83,6 +83,7 @@ def test_what_rests_on_a_limit_is_checked_at_most() -> None:
         ("whole.loop.mem", "compose: {whole: {entered: {because: …}}}"),
         ("D1.one-output", "compose: {D1: {one_output: {because: …}}}"),
         ("start.mem", "initial: …"),
+        ("environment.a.some", "the input, with PORT its input, and why: `environment: {a.PORT: {assume: …"),
         ("environment.in.r", "environment: {in.r: {assume: …, because: …}}"),
     ],
 )
