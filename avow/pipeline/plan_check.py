@@ -24,7 +24,7 @@ from avow.system.graph import dataflow
 from avow.system.node_plan import never_read
 from avow.system.plan import Located, Method, System
 from avow.system.rosgraph import account
-from avow.system.statements import not_validated, requirement_sentences, without_words
+from avow.system.statements import expired, not_validated, requirement_sentences, without_words
 from avow.system.topics import heard, turned, unknown_types
 
 
@@ -52,6 +52,7 @@ def of_plan(
         *_policy(system),
         *requirement_sentences(system),
         *without_words(system),
+        *expired(system),
         *not_validated(system),
         *left_out(system),
         *excluded(system),

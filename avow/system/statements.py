@@ -4,6 +4,7 @@ ones; and requirements whose sentence contradicts their formula: the sentence is
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from datetime import datetime
 
 from avow.base.diagnostics import Diagnostic, Severity, Span
 from avow.base.persons import unreadable, wrong_day
@@ -43,6 +44,15 @@ def without_words(system: System) -> Iterator[Diagnostic]:
                 hint = "it needs a reason of its own: write  constant: {because: …, says: …, who: …, until: …}"
             message = f"{statement.place}: no plain words yet"
             yield Diagnostic("PLAN128", message, statement.span, Severity.WARNING, hint)
+
+
+def expired(system: System) -> Iterator[Diagnostic]:
+    """A warning for each assumption of this plan whose last day has passed."""
+    for statement in system.plan.statements:
+        if _own(statement, system.plan) and "" < statement.until < datetime.now().astimezone().date().isoformat():
+            text = f"{statement.place} has expired: its last day was {statement.until}"
+            hint = "decide whether it still holds, and give a new day: until: …"
+            yield Diagnostic("PLAN105", text, statement.span, Severity.WARNING, hint)
 
 
 def not_validated(system: System) -> Iterator[Diagnostic]:

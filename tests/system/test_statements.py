@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from avow.system.statements import not_validated, without_words
+from avow.system.statements import expired, not_validated, without_words
 
 from .test_system import A, faults, make
 
@@ -76,5 +76,7 @@ def test_that_an_input_does_not_change_has_words_of_its_own(tmp_path: Path) -> N
         silent = [d.hint or "" for d in without_words(system)]
         assert [hint for hint in silent if "constant: {because" in hint] == silent
         assert len(silent) == sum(not words for _, words in wanted)
+    gone = make(tmp_path / "gone", A, entry.format(f"until: 2020-02-02, {assumed.format(own)}"))
+    assert [d.message for d in expired(gone)] == ["environment.a.r has expired: its last day was 2020-02-02"]
     assert [d.code for d in faults(tmp_path / "x", A, entry.format(f"constant: {own}"))] == ["PLAN110"]
     assert [d.code for d in faults(tmp_path / "y", A, entry.format("constant: {says: It stays}"))] == ["PLAN104"]
