@@ -73,7 +73,7 @@ def outdated(case: Case, path: Path, root: Path) -> tuple[str, ...]:
     here = _folder(case, root).is_dir()
     files = {name for name, mark in case.digests if here and _digest(root / name) != mark}
     found = [f"{name} has changed since the report was made" for name in sorted(files | set(stale(case, root)))]
-    return (*differences(case, path, root), *found, *(asked_otherwise(case, root) if here and not found else ()))
+    return (*found, *differences(case, path, root), *(asked_otherwise(case, root) if here and not found else ()))
 
 
 def asked_otherwise(case: Case, root: Path) -> tuple[str, ...]:
@@ -209,7 +209,9 @@ def _ledger(case: Case, ledger: Ledger, root: Path | None) -> Iterable[str]:
             # supporting records that no longer count cannot improve a verdict
             entry.evidence.verdict.supports and entry in (not_established(known[mark]), changed_since(known[mark]))
         ):
-            yield f"the report quotes {where} otherwise than the ledger has it"
+            again = entry == changed_since(known[mark])  # what it read is again as it was
+            how = "as of an earlier state, and it counts now" if again else "otherwise than the ledger has it"
+            yield f"the report quotes {where} {how}"
     planned = {(view.id, method): key for view in case.obligations for method, key in view.planned}
     needed, told = history(entries, [view.obligation for view in case.obligations], planned)
     newer = [entry for mark, entry in known.items() if mark not in quoted and mark in needed]

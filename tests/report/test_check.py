@@ -168,9 +168,11 @@ def test_what_counts_no_more_is_quoted_so_and_a_refutation_is_not(
             replace(v, evidence=tuple(replace(i, entry=no_more(entry)) for i in v.evidence if i.entry == entry))
             for v in honest.obligations
         )
-        told = [line for line in _ledger(replace(honest, obligations=views), ledger, made) if "otherwise" in line]
+        told = [line for line in _ledger(replace(honest, obligations=views), ledger, made) if "report quotes" in line]
         quoted = any(i.entry == entry for v in honest.obligations for i in v.evidence)
         assert bool(told) == (quoted and not entry.evidence.verdict.supports)
+        how = "counts now" if no_more is changed_since else "otherwise than"  # an edit of a file looks like the first
+        assert all(how in line for line in told)
 
 
 def test_files_that_are_others_now_are_named_and_are_no_difference(tmp_path: Path) -> None:
