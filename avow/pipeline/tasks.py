@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
 from avow.base.module_path import leave_here
+from avow.base.suggestions import did_you_mean
 from avow.base.tuning.running import BYTE_CODE_ROOM, COLLECTED
 from avow.base.workspace import Workspace
 from avow.pipeline.reporter import reporter_of
@@ -84,7 +85,16 @@ class Pipeline:
         if any(name.partition(":")[0] not in ("report", "check") for name in self._wanted) or not self._wanted:
             trust_plugins()
 
-        yield from stages(state)
+        made: set[str] = set()
+        for task in stages(state):
+            made |= {task["basename"], f"{task['basename']}:{task['name']}"}
+            yield task
+        own = vars(sys.modules.get("dodo", sys))  # dodo.py may have tasks of its own
+        for name in self._wanted if _runs(self._wanted) else ():
+            known = name in made or f"task_{name.partition(':')[0]}" in own or "*" in name
+            if not known and (hint := did_you_mean(name, made)):  # any other name may be a file
+                print(f"there is no task {name}: {hint}", file=sys.stderr)
+                raise SystemExit(2)
 
 
 def _has_room() -> bool:

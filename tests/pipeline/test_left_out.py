@@ -16,6 +16,7 @@ from avow.pipeline.results import Result
 from avow.pipeline.stages import stages
 from avow.pipeline.state import State, system_of, task_name
 from avow.pipeline.summary import job_summary, print_summary, results_json
+from avow.pipeline.tasks import Pipeline
 from avow.system.load import load_system
 
 CONTRACT = "node n { inputs() outputs( y : REAL ) topics() guarantee low ( out.y <= 1 ) }\n"
@@ -45,6 +46,18 @@ def test_every_folder_has_a_task_that_doit_takes(tmp_path: Path) -> None:
     assert not [name for name in names if "=" in name]
     assert {system_of(name) for name in names if name.startswith("verify:")} == set(broken)
     assert {task_name(name) for name in broken} >= {"a-b", "x"}  # most are as they are written
+
+
+def test_a_misspelt_task_has_a_suggestion(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "contracts" / "pill").mkdir(parents=True)
+    (tmp_path / "contracts" / "pill" / "plan.yaml").write_text("system: [")
+    for word, meant in (("verfy", "verify"), ("verify:pil", "verify:pill")):
+        with pytest.raises(SystemExit) as ended:
+            list(Pipeline(tmp_path, [word]).tasks())
+        assert ended.value.code == 2
+        assert f"there is no task {word}: did you mean `{meant}`?" in capsys.readouterr().err
+    for word in ("verify:pill", "verify:*", "list", "other.txt"):
+        assert list(Pipeline(tmp_path, [word]).tasks())
 
 
 def test_a_system_is_asked_for_by_its_folder_too(tmp_path: Path) -> None:
