@@ -176,12 +176,16 @@ def _in_vain(file: LintedFile, trees: Iterable[Define], named: Collection[str]) 
     for tree in trees:
         name = tree.name.text
         if name not in named:
-            message = f"nothing speaks of the definition `{name}`"
-            yield _warning("RCL418", message, span(tree.name.start, tree.name.end), "remove it, or use it")
+            yield _warning("RCL418", unspoken(name), span(tree.name.start, tree.name.end), "remove it, or use it")
         for part in tree.parameters:
             if part.name.text not in _spoken(tree.body):
                 message = f"the definition `{name}` does not speak of its parameter `{part.name.text}`"
                 yield _warning("RCL418", message, span(part.name.start, part.name.end), "remove it, or use it")
+
+
+def unspoken(name: str) -> str:
+    """The message of RCL418 for a definition that nothing uses."""
+    return f"nothing speaks of the definition `{name}`"
 
 
 def spoken(node: NodeSyntax) -> frozenset[str]:

@@ -6,6 +6,7 @@ Every part that can be wrong keeps its place in the file, so that a later stage 
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import field
 from enum import StrEnum
@@ -17,7 +18,7 @@ from avow.base.diagnostics import Span
 from avow.base.files import sha256
 from avow.base.records import dataclass
 from avow.language.contract import Contract, Port
-from avow.language.lints import uncarried
+from avow.language.lints import uncarried, unspoken
 from avow.ros.launch import Launched
 from avow.ros.names import Resolver
 
@@ -433,9 +434,16 @@ class Plan:
 
     @property
     def off(self) -> frozenset[str]:
-        """The lints that are switched off: codes, and lints about topics of an input that is memory."""
+        """The lints that are switched off: codes, and lints about topics of an input that is memory and about
+        definitions that a formula of the plan names."""
         memory = ((entry.node, port) for entry in self.nodes if entry.source for port in entry.source.memory)
-        return frozenset((*self.lints_off, *(uncarried(node, f"in.{port}") for node, port in memory)))
+        formulas = [text for r in self.requirements for text in (r.formula, r.temporal)]
+        formulas += [*(e.assume for e in self.environment), *(e.initial for e in self.connections)]
+        options = (method.options.data for entry in self.nodes for method in entry.methods)
+        formulas += [str(given.get("invariants")) for given in options if isinstance(given, Mapping)]
+        used = {word for text in formulas for word in re.findall(r"(?<![.\w])\w+", text or "")}
+        topics = (uncarried(node, f"in.{port}") for node, port in memory)
+        return frozenset((*self.lints_off, *topics, *map(unspoken, used)))
 
     def node(self, name: str) -> NodePlan:
         """The plan of a node; a node that the plan does not mention has no methods and criticality ``medium``."""

@@ -116,6 +116,13 @@ def test_check_of_a_system_reads_its_plan(tmp_path: Path) -> None:
     assert "plan.yaml:4:" in output
     (tmp_path / "plan.yaml").write_text(plan + "lints_off: [RCL405]\n")
     assert "RCL405" not in invoke("check", str(tmp_path))[1]
+    text = (tmp_path / "system.rcl").read_text()
+    (tmp_path / "system.rcl").write_text("context { define low(x : BOOL) = not x; }\n" + text)
+    for formula, warned in (("not n.b", True), ("low(n.b)", False)):
+        needed = f"requirements: {{R1: {{text: The robot is low., formula: {formula}}}}}\n"
+        (tmp_path / "plan.yaml").write_text(plan + needed)
+        assert ("RCL418" in invoke("check", str(tmp_path))[1]) is warned
+    (tmp_path / "system.rcl").write_text(text)
     for wrong, said in (
         ("policy: sil9\n", "POLICY001"),
         ("requirements:\n  R: {text: t, temporal: alway (n.b)}\n", "`alway` is not declared"),
