@@ -34,7 +34,7 @@ from .program import While, has_loops, statements
 from .triples import Triple
 from .tuning import BRIEFLY_SECONDS, ENDLESS_EFFORT
 from .witness import Breach, breach, endless_run
-from .work import Work, load, other_numbers, run_conditions
+from .work import Work, left_unassigned, load, other_numbers, run_conditions
 from .wp import Condition, TooLarge, conditions
 
 GIVEN = frozenset({Verdict.PROVED, Verdict.PARTIAL, Verdict.JUSTIFIED})
@@ -52,7 +52,7 @@ def problems(job: Job) -> tuple[Diagnostic, ...]:
     except Rejected as rejected:
         return rejected.diagnostics
     clauses = (*job.node.assumptions, *(job.clause(o) for o in job.obligations))
-    return (*_undated(job), *other_numbers(work.checked.program, clauses))
+    return (*_undated(job), *other_numbers(work.checked.program, clauses), *left_unassigned(work))
 
 
 def _undated(job: Job) -> tuple[Diagnostic, ...]:
@@ -157,7 +157,7 @@ def settle(job: Job, limits: Limits) -> Report:
             worse = {*GIVEN, Verdict.UNKNOWN}
         else:
             worse = set(GIVEN) if running.verdict is not Verdict.PROVED else set()
-        outcomes = tuple(_stopped(o, running, work) if o.verdict in worse else _total(o) for o in outcomes)
+        outcomes = tuple(_stopped(o, running, work) if o.verdict in worse else _total(o, work) for o in outcomes)
     allowed = effort_told(from_seconds(limits.seconds))
     outcomes = tuple(replace(o, details={**o.details, **allowed}) for o in outcomes)
     return Report(outcomes, "weakest preconditions", version, logs=logs)
@@ -281,9 +281,9 @@ def _holds(condition: Condition, settler: Settler, deadline: float) -> bool:
     return settler.proves(condition.hypotheses, condition.goal, effort=_left(deadline))
 
 
-def _total(outcome: Outcome) -> Outcome:
-    """A current proof also shows that the same program has an output for every input."""
-    if outcome.verdict is not Verdict.PROVED:
+def _total(outcome: Outcome, work: Work) -> Outcome:
+    """A current proof also shows that the same program has an output for every input, if each path assigns it."""
+    if outcome.verdict is not Verdict.PROVED or work.checked.unassigned:
         return outcome
     return replace(outcome, details={**outcome.details, OUTPUT_FOR_EVERY_INPUT: True})
 

@@ -8,7 +8,7 @@ from typing import TypeVar
 from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.base.records import dataclass
 from avow.base.suggestions import did_you_mean
-from avow.formulas.formula import substitute
+from avow.formulas.formula import free_variables, substitute
 from avow.language import sorts as s
 from avow.language.contract import Contract, Node, Port
 from avow.language.printer import show_sort, show_term
@@ -35,6 +35,8 @@ _Place = tuple[Role, str]
 class Checked:
     program: Program
     reading: Reading
+    unassigned: frozenset[str]
+    """The variables of outputs that some path leaves without a value."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,7 +93,11 @@ class _Checker:
         sorts = self.names.sorts
         state = tuple(variable(name, sort) for name, sort in sorted(sorts.items()))
         assigned = frozenset(v for v in state if v.name in self.assigned_names)
-        return Checked(Program(body, state, assigned, dict(self.ghosts)), reading)
+        spoken = ((at, free_variables(term)) for at, term in reading.terms.items())
+        read = (*spoken, *((at, predicate.free) for at, predicate in reading.predicates.items()))
+        made = frozenset(v.name for (role, _), some in read if role is Role.OUTPUT for v in some)
+        program = Program(body, state, assigned, dict(self.ghosts))
+        return Checked(program, reading, program.unassigned(made - frozenset(self.given)))
 
     def _attempt(self, action: Callable[[], T]) -> T | None:
         try:

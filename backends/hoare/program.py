@@ -92,6 +92,10 @@ class Program:
         matched = (v.name for s in statements(self.body) if isinstance(s, Match) for v in s.variables)
         return frozenset((*(v.name for v in (*self.state, *self.ghosts.values())), *matched))
 
+    def unassigned(self, names: frozenset[str]) -> frozenset[str]:
+        """Those variables that some path through the program does not assign: a loop may run zero times."""
+        return _unassigned(self.body, names)
+
 
 @dataclass(frozen=True, slots=True)
 class Predicate:
@@ -133,6 +137,16 @@ def statements(block: Block) -> Iterator[Statement]:
                 pass
             case _:
                 assert_never(statement)
+
+
+def _unassigned(block: Block, names: frozenset[str]) -> frozenset[str]:
+    for statement in block:
+        match statement:
+            case Assign(target=target) | Update(target=target):
+                names -= {target.name}
+            case If(then=then, otherwise=otherwise) | Match(then=then, otherwise=otherwise):
+                names = _unassigned(then, names) | _unassigned(otherwise, names)
+    return names
 
 
 def has_loops(program: Program) -> bool:

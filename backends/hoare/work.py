@@ -203,6 +203,13 @@ def other_numbers(program: Program, clauses: Iterable[Clause]) -> Iterator[Diagn
     )
 
 
+def left_unassigned(work: Work) -> Iterator[Diagnostic]:
+    """A warning for each variable of an output that has no value on some path: the triples let it be anything."""
+    for name in sorted(work.checked.unassigned):
+        message = f"some path through the program assigns nothing to `{name}`, which an output is read from"
+        yield Diagnostic("HOARE420", message, work.checked.program.body[-1].span, Severity.WARNING)
+
+
 def _thresholds(formulas: Iterable[Term]) -> frozenset[Fraction]:
     return frozenset(b.number for formula in formulas for b in bounds(formula)) - _COMMON
 

@@ -16,6 +16,7 @@ from avow.backends.hoare import backend as settling
 from avow.backends.hoare.outline import one_line
 from avow.base.diagnostics import Rejected
 from avow.base.verdict import Link, Outcome, Verdict
+from avow.evidence.record import OUTPUT_FOR_EVERY_INPUT
 from avow.language.terms import Term
 from avow.solving import second
 from hoare.systems import make_job, sensor
@@ -239,6 +240,22 @@ def test_division_by_zero_breaks_a_triple(tmp_path: Path) -> None:
     assert outcome.verdict is Verdict.REFUTED
     assert "division by zero" in outcome.summary
     assert verdicts(job(tmp_path, small("out.y * in.b == in.a", "in.b > 0"), "y := a / b"))["G1"] is Verdict.PROVED
+
+
+@pytest.mark.parametrize(
+    ("program", "total"),
+    [
+        ("IF a < b THEN y := b", False),
+        ("y := a\nIF a < b THEN y := b", True),
+        ("IF a < b THEN y := b ELSE IF a > b THEN SKIP ELSE y := a", False),
+    ],
+)
+def test_an_output_without_a_value_is_told(tmp_path: Path, program: str, total: bool) -> None:
+    """The guarantee is proved: it says nothing of the path that does not assign. But some input has no output."""
+    wanted = job(tmp_path, small("in.a < in.b -> out.y == in.b"), program)
+    outcome = settle(wanted)["G1"]
+    assert (outcome.verdict, OUTPUT_FOR_EVERY_INPUT in outcome.details) == (Verdict.PROVED, total)
+    assert [d.code for d in BACKEND.check(wanted)] == ([] if total else ["HOARE420"])
 
 
 @pytest.mark.slow
