@@ -18,6 +18,7 @@ from typing import Any
 
 from avow.backend_kit.given import summarized
 from avow.backend_kit.programs.callbacks import SECOND, Driver, Event, Run, Silent, driver
+from avow.backend_kit.programs.compared import stamp_of
 from avow.backend_kit.programs.cpython import Replies
 from avow.backend_kit.protocol import Backend, Job, JudgedRun, Limits, Report
 from avow.backend_kit.registry import judge_of_runs
@@ -130,12 +131,15 @@ class _Work:
     """Guarantee → a run that violates it, or in which the class raises."""
     first: list[tuple[Messages, Run]] = field(default_factory=list)
     end: float = 0.0
+    stamped: dict[str, bool] = field(default_factory=dict)
+    """Output's topic → whether a publication had the stamp of a message received."""
 
     def outcomes(self) -> tuple[Outcome, ...]:
         self.end = time.monotonic() + self.limits.seconds
         self.counts = {o.name: _Count() for o in self.job.obligations}
         self.put(list(self.kept()), drawn=False)
         stopped = self.sweep()
+        self.check_stamps()
         found = {o.name: self.failed(o) for o in self.job.obligations if o.name in self.failing}
         unsteady = next((o.summary for o in found.values() if o.verdict is Verdict.UNKNOWN), "") or self.unsteady()
         wrong = self.apart()
@@ -190,6 +194,9 @@ class _Work:
             self.runs += drawn
             self.messages += drawn * len(events)
             self.count_answers(events if drawn else (), run)
+            heard = {stamp_of(event.data) for event in events} - {None}
+            for said in (e for e in run.said if heard and e.topic in self.outputs and stamp_of(e.data) is not None):
+                self.stamped[said.topic] = self.stamped.get(said.topic, False) or stamp_of(said.data) in heard
             self.replayed += not drawn
             judged = self.judged(events, run)
             for name, count in self.counts.items():
@@ -201,6 +208,16 @@ class _Work:
                 count.reason = count.reason or one.reason
                 if self.wrong(name, run, judged) is not None:
                     self.failing.setdefault(name, events)
+
+    def check_stamps(self) -> None:
+        """Raises Rejected if answers are paired by stamp, and no publication on a topic has the stamp of a message."""
+        paired = self.job.options.get("answers", {})
+        if self.failing or paired.get("by") != "stamp" or "output" in paired:
+            return
+        for topic in sorted(topic for topic, copied in self.stamped.items() if not copied):
+            message = f"{self.driver.source.class_name} publishes {topic} without the stamp of what it answers"
+            place, hint = self.driver.source.place.at("source"), "copy the header of the message into the answer"
+            raise Rejected(Diagnostic("HYPO108", message, place, hint=hint))
 
     def count_answers(self, events: Messages, run: Run) -> None:
         """Which messages a callback answered; a publication of a later timer answers all messages before it."""

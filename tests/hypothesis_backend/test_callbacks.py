@@ -182,6 +182,30 @@ def test_a_class_that_never_publishes_fails(tmp_path: Path) -> None:
     assert {o.verdict for o in found.values()} == {Verdict.ERROR}, found
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("given", ["header=message.header, ", ""])
+def test_answers_paired_by_stamp_have_one(tmp_path: Path, given: str) -> None:
+    text = DIRECT.replace("std_msgs.msg import Float64, String", "own_msgs.msg import Level, Reading")
+    text = text.replace("Float64", "Reading").replace("String", "Level")
+    text = text.replace("publish(self.level)", f"publish(Level({given}data=self.level))")
+    contract = CONTRACT.replace("float64 r", "own_msgs/Reading r").replace("string status", "own_msgs/Level status")
+    made = job(tmp_path / "w", "rospy", text, contract=contract)
+    for name, kind in (("Reading", "float64"), ("Level", "string")):
+        path = tmp_path / f"w/msg/own_msgs/msg/{name}.msg"
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(f"std_msgs/Header header\n{kind} data\n", encoding="utf-8")
+    plan = (tmp_path / "w/plan.yaml").read_text(encoding="utf-8")
+    plan = (
+        plan.replace("{cases: 100}", "{cases: 100, answers: {by: stamp}}") + "messages: [msg]\nros: {distro: noetic}\n"
+    )
+    (tmp_path / "w/plan.yaml").write_text(plan, encoding="utf-8")
+    loaded = load_system(tmp_path / "w")
+    made = method_job(loaded, loaded.contract.node("watch"), loaded.plan.node("watch").methods[0])
+    found = asked(made)
+    assert (Verdict.ERROR in {o.verdict for o in found.values()}) == (not given), found
+    assert given or "publishes /status without the stamp of what it answers" in found["high"].summary
+
+
 def test_the_names_by_which_it_runs_are_part_of_the_key(tmp_path: Path) -> None:
     given = job(tmp_path / "w", "rospy", ROS1)
     plan = (tmp_path / "w/plan.yaml").read_text(encoding="utf-8")

@@ -28,7 +28,7 @@ class Compared:
 
 def compared(recorded: Sequence[Recorded], run: Run) -> Iterator[Compared]:
     """For each topic that the class publishes."""
-    copied = {_stamp(event.data) for event, _ in recorded if event.topic not in run.spoken}
+    copied = {stamp_of(event.data) for event, _ in recorded if event.topic not in run.spoken}
     for topic in sorted(run.spoken):
         published = [event for event in run.said if event.topic == topic]
         before = [(event, raw) for event, raw in recorded if event.topic == topic]
@@ -60,14 +60,15 @@ def _plain_fields(data: Any, like: Any) -> Any:
 def _by_clock(published: Event, recorded: Event, fields: Mapping[str, Any], copied: set[int | None]) -> bool:
     """Whether they differ only in stamps that are each its clock's time: the class's is the time of its publication,
     the recorded one at most a second from its own, and neither is the stamp of a message that it received."""
-    mine, old = _stamp(published.data), _stamp(recorded.data)
+    mine, old = stamp_of(published.data), stamp_of(recorded.data)
     if not mine or not old or copied & {mine, old}:  # none, or not stamped
         return False
     near = mine == published.at and abs(old - recorded.at) <= SECOND
     return near and _same(_unstamped(published.data), _unstamped(recorded.data), fields)
 
 
-def _stamp(data: Any) -> int | None:
+def stamp_of(data: Any) -> int | None:
+    """The stamp in a message's header, in nanoseconds; None without one."""
     header = dict(data["d"]).get("header")
     stamp = dict(header["d"]).get("stamp") if isinstance(header, dict) and "d" in header else None
     return int(stamp["i"]) if isinstance(stamp, dict) and "i" in stamp else None
