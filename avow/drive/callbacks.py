@@ -12,6 +12,7 @@ import copy
 import difflib
 import heapq
 import json
+import os
 import sys
 import threading
 import traceback
@@ -113,7 +114,15 @@ class Driven(Refusals, Messages, Turns):
 
     def call(self, act: Callable[..., Any], *given: Any, free: bool = False) -> Any:
         """What a callback of the class returns. `free`: a coroutine may wait, as it is of no callback group."""
-        returned = act(*given)
+        try:
+            returned = act(*given)
+        except TypeError as error:
+            code = getattr(act, "__code__", None)
+            if code is not None and error.__traceback__ is not None and error.__traceback__.tb_next is None:
+                # the callback does not take what it is given: no line of it was reached
+                place = f"({os.path.basename(code.co_filename)}, line {code.co_firstlineno})"  # noqa: PTH119
+                error.args = (f"{error} {place}",)
+            raise
         if hasattr(returned, "__await__"):
             return self._proceed(returned, free)
         return returned

@@ -432,6 +432,13 @@ def test_what_a_callback_raises_has_its_message_topic_and_line(tmp_path: Path, k
     assert f" (watch.py, line {text[: text.index('# HERE')].count(chr(10)) + 1})" in done.output
 
 
+def test_a_callback_that_takes_no_message_is_told_at_its_line(tmp_path: Path) -> None:
+    text = ROS2.replace("def heard(self, message)", "def heard(message)")
+    done = drive(system(tmp_path / "w", "rclpy", text), "watch", trace(tmp_path))
+    line = text[: text.index("def heard(message)")].count("\n") + 1
+    assert f"takes 1 positional argument but 2 were given (watch.py, line {line})" in " ".join(done.output.split())
+
+
 LOADED = [  # the first line of the file, and what is told if it cannot be loaded
     ("from .helper import x", "no known parent package (watch.py, line 1); a relative import needs the file in the"),
     ("from rospy import Rate", "Rate is not driven; instead: Timer (watch.py, line 1)"),
