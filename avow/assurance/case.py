@@ -162,7 +162,7 @@ def conclude(facts: Facts) -> Case:
     )
     single = _single(views)
     weakened = deficits(
-        views, requirements, supposed, listed, findings, relied, single, facts.run.id, missing_tools(facts)
+        views, requirements, supposed, listed, findings, relied, single, hazards, facts.run.id, missing_tools(facts)
     )
     changed = changes(facts.baseline, requirements, views, supposed, weakened)
     basis = {n for c in closed.values() for n in c.claims} if closed else set(whole.claims)

@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from avow.assurance.answers import Assumption, Deficit, Level
+from avow.assurance.hazards import HazardView
 from avow.assurance.model import Handled, ObligationView, OpenItem, RequirementView
+from avow.assurance.policy import CRITICALITIES
 from avow.assurance.relied import EXHAUSTIVE, Relied, looked_at
 from avow.base.plain import count
 from avow.base.verdict import Link, Object, Verdict
@@ -31,6 +33,11 @@ _WORDS = {
     "read": ("guarantee{s} on a person's reading only", "only read", "No tool has looked at them."),
     "single": ("guarantee{s} with one method only", "by one method", "An error of that tool would not be noticed."),
     "idle": ("guarantee{s} that serve no requirement", "serving none", "No requirement needs them."),
+    "underrated": (
+        "guarantee{s} of lower criticality than a hazard's severity",
+        "rated below a hazard",
+        "The policy asks less of their nodes than the hazard suggests.",
+    ),
     "tied": (
         "guarantee{s} translated by a person for the tool",
         "translated by a person",
@@ -54,6 +61,10 @@ _WORDS = {
 """For each kind its name, with its number before it; the name on the first screen; and its meaning for the reader."""
 
 
+_LEAST = {"catastrophic": "high", "critical": "high", "marginal": "medium", "negligible": "low"}
+"""A hazard's severity (MIL-STD-882E, table I) → the least criticality of the nodes that its mitigations rest on."""
+
+
 def of_deficits(kinds: int) -> str:
     """``6 kinds of assurance deficit``: the wording that every text uses."""
     return f"{count(kinds, 'kind')} of assurance deficit"
@@ -72,6 +83,7 @@ def deficits(
     findings: Sequence[Handled],
     relied: Mapping[str, Relied],
     single: Sequence[str],
+    hazards: Sequence[HazardView],
     run: str,
     missing: Mapping[tuple[str, str], str],
 ) -> tuple[Deficit, ...]:
@@ -96,6 +108,7 @@ def deficits(
         "read": [v.id for v in guarantees if _status(v, relied) is Status.REVIEWED],
         "single": list(single),
         "idle": [v.id for v in guarantees if requirements and not any(v.id in r.closure for r in requirements)],
+        "underrated": [v.id for v in guarantees if any(v.id in h.closure and _below(v, h) for h in hazards)],
         "tied": [v.id for v in guarantees if v.id in relied and _by_hand(v, relied[v.id])],
         "unrun": [f"{v.id}: {method}" for v, method in unrun],
         "programs": [v.id for v in programs],
@@ -126,6 +139,11 @@ def words_of(key: str, number: int) -> str:
 
 def _status(view: ObligationView, relied: Mapping[str, Relied]) -> Status | None:
     return relied[view.id].status if view.id in relied else None
+
+
+def _below(view: ObligationView, hazard: HazardView) -> bool:
+    known, least = CRITICALITIES, _LEAST[hazard.hazard.severity]
+    return view.criticality in known and known.index(view.criticality) > known.index(least)
 
 
 def _by_hand(view: ObligationView, relied: Relied) -> bool:

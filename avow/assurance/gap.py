@@ -18,7 +18,7 @@ from avow.base.plain import count
 from avow.base.tuning.shown import TOOL_WORDS
 from avow.base.verdict import Isolation, Link, Verdict
 from avow.evidence.obligation import Kind
-from avow.evidence.record import ISOLATION, SIGNED_BY, Evidence
+from avow.evidence.record import ISOLATION, SIGNED_BY, SOLVER, Evidence
 from avow.evidence.status import Status, effective, join, link_rank, weigh
 
 
@@ -61,11 +61,12 @@ def counted(view: ObligationView, demand: Demand, policy: Policy, today: date) -
 def independent(evidence: Iterable[Evidence]) -> int:
     """The largest number of items that differ pairwise in backend AND in tool: two backends with one solver count once.
 
-    This is a maximum matching between backends and tools, with an edge for each item.
+    The tool is the solver that decides, so Dafny and Hoare triples, which both call Z3, count once. This is a maximum
+    matching between backends and tools, with an edge for each item.
     """
     edges: dict[str, set[str]] = {}
     for item in evidence:
-        edges.setdefault(item.backend, set()).add(item.tool)
+        edges.setdefault(item.backend, set()).add(str(item.details.get(SOLVER, item.tool)))
     partner: dict[str, str] = {}
 
     def place(backend: str, tried: set[str]) -> bool:

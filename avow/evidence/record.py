@@ -41,6 +41,9 @@ AGREES = "agrees"
 """Among the details of a program's agreement with models: method → the node's guarantees about outputs that were
 compared."""
 
+SOLVER = "solver"
+"""Among the details: the solver that decides for the tool, named as methods that call it directly name their tool."""
+
 STANDS_ON = (OBSERVED, ISOLATION, RETRY, "certificate", "mutation", "valid_until")
 """The details by which one of two records with the same statement may count and the other not."""
 

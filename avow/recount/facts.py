@@ -16,6 +16,8 @@ _SUPPORTS = ("proved", "checked", "tested", "monitored", "reviewed", "justified"
 """Best first."""
 _STRICT = 1 - 1e-5
 """Bounds in records are decimals of six digits: so far may one lie below what the sample gives."""
+_BELOW = {"catastrophic": ("medium", "low"), "critical": ("medium", "low"), "marginal": ("low",), "negligible": ()}
+"""A hazard's severity → the criticalities that are too low for what mitigates it."""
 _QUOTED: tuple[str, ...] = ("assumptions", "baseline", "changes", "digests", "environment", "hazards")
 _QUOTED += ("nodes", "policy", "run", "standard", "statements", "system", "title", "today", "tools", "methods")
 _QUOTED += ("ledger_head", "sources")
@@ -133,6 +135,12 @@ class Facts:
             "withdrawn": sum(i["kind"] == "withdrawn" for i in self.case["open_items"]),
             "idle": sum(
                 not any(_id(v) in r["closure"] for r in self.requirements) for v in within if self.requirements
+            ),
+            "underrated": sum(
+                any(
+                    _id(v) in h["closure"] and v["criticality"] in _BELOW[h["hazard"]["severity"]] for h in self.hazards
+                )
+                for v in within
             ),
             "unrun": sum(_silent(v, method) for v in within for method, _ in v["planned"]),
             "programs": sum(v["obligation"]["kind"] == "program" and v["status"] == "not-run" for v in self.views),

@@ -38,6 +38,7 @@ _DEFICITS = {
     "guarantees? on a person's reading only": "read",
     "guarantees? with one method only": "single",
     "guarantees? that serve no requirement": "idle",
+    "guarantees? of lower criticality than a hazard's severity": "underrated",
     "guarantees? translated by a person for the tool": "tied",
     "planned methods? without an answer": "unrun",
     "claims? about a node's program not run": "programs",

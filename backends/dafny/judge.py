@@ -21,7 +21,7 @@ from avow.base.plain import ALLOWS_MORE
 from avow.base.records import dataclass
 from avow.base.tuning.effort import JUDGE_EFFORT
 from avow.base.verdict import Verdict
-from avow.evidence.record import OUTPUT_FOR_EVERY_INPUT
+from avow.evidence.record import OUTPUT_FOR_EVERY_INPUT, SOLVER
 from avow.formulas.formula import free_variables
 from avow.formulas.values import Value, show
 from avow.isolation.outside import Outside
@@ -120,7 +120,8 @@ def _verdict(
     generated: Generated,
     tried: list[dict[str, str]],
 ) -> Settled:
-    details: dict[str, object] = {"module": generated.impl_module, "members": [name for _, name in scanned.members]}
+    members = [name for _, name in scanned.members]
+    details: dict[str, object] = {SOLVER: "z3", "module": generated.impl_module, "members": members}
     if unproved:
         details["not proved"] = list(unproved)
         if tried:

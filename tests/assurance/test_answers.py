@@ -520,6 +520,11 @@ def test_requirements_on_another_guarantee_of_the_weakest_node_are_counted_besid
     assert {d.key: d.claims for d in proved.deficits}.get("idle") is None
     idle = case(system({"a": ["g", "h"]}, requirements=asked[:1]), node, made)
     assert {d.key: d.claims for d in idle.deficits}["idle"] == (node[1].id,)
+    assert {d.key: d.claims for d in whole.deficits}["underrated"] == (node[0].id, node[1].id)
+    spilt = case(
+        system({"a": ["g", "h"]}, requirements=asked, hazards=[replace(danger, severity="marginal")]), node, made
+    )
+    assert "underrated" not in {d.key for d in spilt.deficits}
     assert whole.answers.verdict == "Argued (no overall failure rate)"
     alone = case(system({"a": ["g"]}, requirements=asked[:1]), node[:1], made[:1]).answers.weakest
     assert alone is not None

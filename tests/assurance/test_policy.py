@@ -16,7 +16,7 @@ from avow.assurance.policy import Demand, costs, profile, profile_names, read_po
 from avow.base.diagnostics import Rejected, Span
 from avow.base.verdict import Link, Object, Verdict
 from avow.evidence.obligation import Kind, Obligation
-from avow.evidence.record import ISOLATION, SIGNED_BY, Evidence
+from avow.evidence.record import ISOLATION, SIGNED_BY, SOLVER, Evidence
 from avow.evidence.status import Status
 from avow.report import formats
 from avow.system.plan import Finding, Located, Requirement
@@ -150,6 +150,7 @@ def test_independence_is_a_matching() -> None:
     assert independent([]) == 0
     assert independent([item("a", "z3"), item("b", "z3"), item("a", "cvc5")]) == 2
     assert independent([item("a", "z3"), item("a", "cvc5")]) == 1
+    assert independent([item("hoare", "z3"), replace(item("dafny", "dafny"), details={SOLVER: "z3"})]) == 1
     assert independent([item("a", "x"), item("b", "x"), item("b", "y"), item("c", "y"), item("c", "z")]) == 3
 
 
