@@ -13,11 +13,13 @@ from dataclasses import replace
 from avow.base.diagnostics import Diagnostic, Severity
 from avow.base.graphs import components
 from avow.base.records import dataclass
+from avow.base.remembered import by_identity
 from avow.language.contract import Node, Port
 from avow.language.sorts import Sort
 from avow.language.terms import Role
 from avow.system.graph import Graph, wired
 from avow.system.plan import Edge, Endpoint, EnvironmentInput, Plan, System
+from avow.system.topics import ends
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,17 +92,22 @@ def apart(plan: Plan, nodes: Iterable[Node]) -> dict[str, str]:
     return found
 
 
-def own_inputs(system: System, graph: Graph) -> dict[str, str]:
-    """The same; in addition, inputs from the environment with one name but different types are different inputs: the
-    first node's type keeps the name, another is named after the first node that reads it."""
+@by_identity(16)
+def own_inputs(system: System, graph: Graph) -> Mapping[str, str]:
+    """The same; in addition, inputs from the environment with one name but different types or topics are different
+    inputs: the first node's keeps the name, another is named after the first node that reads it."""
     found = apart(system.plan, system.contract.nodes)
-    sorts: dict[str, Sort] = {}
-    others: dict[tuple[str, Sort], str] = {}
+    heard = ends(system.contract.nodes, system.plan.ros.names).inputs
+    first: dict[str, tuple[Sort, frozenset[str]]] = {}
+    others: dict[tuple[str, Sort, frozenset[str]], str] = {}
     for at in graph.environment:
-        name = found.get(str(at), f"in.{at.port}")
-        sort = system.contract.node(at.node).input(at.port).sort
-        if sorts.setdefault(name, sort) != sort:
-            found[str(at)] = others.setdefault((name, sort), str(at))
+        name, sort = found.get(str(at), f"in.{at.port}"), system.contract.node(at.node).input(at.port).sort
+        topics = frozenset(carrier.topic for carrier in heard.get(at, ()))
+        known, carried = first.get(name, (sort, topics))
+        first[name] = known, carried or topics
+        # an end without a topic is linked by its name
+        if sort != known or (topics and carried and topics != carried):
+            found[str(at)] = others.setdefault((name, sort, topics), str(at))
     return found
 
 
@@ -138,7 +145,7 @@ def face(system: System, graph: Graph, name: str, inside: Iterable[str]) -> Face
     """A subsystem from outside."""
     nodes = [system.contract.node(leaf) for leaf in dict.fromkeys(inside)]
     held = frozenset(node.name for node in nodes)
-    alone = apart(system.plan, nodes)
+    alone = own_inputs(system, graph)
     taken: set[str] = set()
     ports: dict[Endpoint, Endpoint] = {}
 
@@ -165,8 +172,7 @@ def face(system: System, graph: Graph, name: str, inside: Iterable[str]) -> Face
             edge = graph.by_target.get(at)
             if edge is not None and edge.source.node in held and not edge.delayed:
                 continue
-            outside = (alone.get(str(at), f"in.{port.name}"), port.sort)
-            value: object = (edge.source, edge.delayed) if edge is not None else outside
+            value: object = (edge.source, edge.delayed) if edge else alone.get(str(at), f"in.{port.name}")
             if value not in known:
                 label = f"{edge.source.port}_before" if edge is not None and edge.delayed else port.name
                 inputs.append(give(node.name, label, port, Role.INPUT))

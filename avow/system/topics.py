@@ -231,7 +231,8 @@ def heard(plan: Plan, contract: Contract) -> tuple[Plan, Contract, tuple[Diagnos
                 continue
             carrier = found.inputs[target][0]
             sources, unclear = _sources(target, port, found, connections)
-            if len(sources) + len(unclear) < 2:
+            outside = [c for c in found.inputs[target] if c.topic not in found.published] if sources else []
+            if len(sources) + len(unclear) + len(outside) < 2:
                 continue
             for publisher, topic in unclear:
                 message = (
@@ -243,14 +244,14 @@ def heard(plan: Plan, contract: Contract) -> tuple[Plan, Contract, tuple[Diagnos
             if unclear:
                 continue
             name = _free(f"topic_{carrier.topic.strip('/').replace('/', '_')}", taken)
-            relay = _relay(name, node.name, port, carrier, sources)
+            relay = _relay(name, node.name, port, carrier, sources, outside)
             nodes.append(relay)
             mine = [c for c in connections if c.target == target]
             known = {source for source, _ in sources}
             connections = [
                 c for c in connections if c.target != target or not (c.source in known or c.source.node in relays)
             ]  # another source contradicts the topics, which `contradicted` reports
-            for (source, _), inner in zip(sources, relay.inputs, strict=True):
+            for (source, _), inner in zip(sources, relay.inputs, strict=False):
                 given = next((c for c in mine if c.source == source), Edge(source, target, span=carrier.span))
                 connections.append(replace(given, target=Endpoint(name, inner.name)))
             connections.append(Edge(Endpoint(name, port.name), target, span=carrier.span))
@@ -292,13 +293,26 @@ def _free(name: str, taken: set[str]) -> str:
     return found
 
 
-def _relay(name: str, listener: str, port: Port, carrier: Carrier, sources: Sequence[tuple[Endpoint, Port]]) -> Node:
-    inputs = tuple(
+def _relay(
+    name: str,
+    listener: str,
+    port: Port,
+    carrier: Carrier,
+    sources: Sequence[tuple[Endpoint, Port]],
+    outside: Sequence[Carrier],
+) -> Node:
+    """`outside`: the listener's topics without a publisher in the system. Their messages come from the environment."""
+    inputs = [
         Port(Role.INPUT, f"{at.node}_{output.name}", output.sort, output.type_name, carrier.span)
         for at, output in sources
-    )
+    ]
+    topics = []
+    for each in outside:
+        called = f"outside{each.topic.replace('/', '_')}"
+        inputs.append(Port(Role.INPUT, called, port.sort, port.type_name, each.span))
+        topics.append(Topic(each.kind, each.topic, inputs[-1], each.span))
     output = Port(Role.OUTPUT, port.name, port.sort, port.type_name, carrier.span)
-    said = " or ".join(str(at) for at, _ in sources)
+    said = " or ".join([*(str(at) for at, _ in sources), *(f"the environment on {c.topic}" for c in outside)])
     formula = Or(tuple(_same(output.variable, wire.variable) for wire in inputs))
     text = " or ".join(f"out.{port.name} == in.{wire.name}" for wire in inputs)
     clause = Clause(
@@ -310,7 +324,7 @@ def _relay(name: str, listener: str, port: Port, carrier: Carrier, sources: Sequ
         text,
         carrier.span,
     )
-    return Node(name, inputs, (output,), (), (), (clause,), carrier.span, relay=True)
+    return Node(name, tuple(inputs), (output,), tuple(topics), (), (clause,), carrier.span, relay=True)
 
 
 def _same(one: Variable, other: Variable) -> Term:

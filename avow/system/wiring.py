@@ -102,12 +102,13 @@ def wiring(system: System, graph: Graph) -> Wiring:
     nodes = [node for node in system.contract.nodes if not node.relay]
     names = system.plan.ros.names
     found = ends(nodes, names)
+    relayed = ends([node for node in system.contract.nodes if node.relay], names).inputs
     late = {edge.target: edge for edge in graph.edges}
     called = {(n.name, t.port.name, whole_name(names, n, t)): t.name for n in nodes for t in n.topics if t.port}
     whole: dict[str, str] = {}
     publishers: dict[str, list[Ended]] = {}
     listeners: dict[str, list[Ended]] = {}
-    outside: set[str] = set()
+    outside = {carrier.topic for at in graph.environment for carrier in relayed.get(at, ())}
     carried: set[Endpoint] = set()
     for into, side in ((publishers, found.outputs), (listeners, found.inputs)):
         for at, carriers in side.items():
@@ -131,7 +132,7 @@ def wiring(system: System, graph: Graph) -> Wiring:
         for edge in graph.edges
         if edge.target not in carried and edge.source.node not in graph.relays and edge.target.node not in graph.relays
     )
-    open_ = tuple(str(at) for at in graph.environment if at not in found.inputs)
+    open_ = tuple(str(at) for at in graph.environment if at not in found.inputs and at not in relayed)
     placed = dict(names.nodes)
     told = tuple(
         (node.name, names.placed(node.name).name, names.placed(node.name).remaps, _said(placed, node.name, system))
