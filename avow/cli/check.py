@@ -12,7 +12,7 @@ import click
 
 from avow.base.codec import document
 from avow.base.codes import LANGUAGE, core_codes, is_lint, sections
-from avow.base.diagnostics import Diagnostic, Rejected
+from avow.base.diagnostics import Diagnostic, Rejected, Severity, Span
 from avow.base.plain import count
 from avow.base.rendering import render, summary, to_sarif, told
 from avow.base.workspace import system_folder
@@ -59,6 +59,7 @@ def command(
             d for d in _of_plan(folder, shelves[folder]) if d not in found and (d.is_error or d.code not in off)
         )
         shelves[folder].keep()
+    found.sort(key=lambda d: list(Severity).index(d.severity))
     if as_json:
         click.echo(document(told(found)))
     elif sarif:
@@ -117,12 +118,12 @@ def _system(folder: Path, found: list[Diagnostic]) -> tuple[list[Path], frozense
     plan_file = folder / "plan.yaml"
     if plan_file.is_file():
         try:
-            plan, _, faults, _ = read_rest(plan_file)
+            plan, _, faults, *_ = read_rest(plan_file)
         except Rejected as rejected:
-            found.extend(rejected.diagnostics)
+            found.extend(_as_told(d, folder) for d in rejected.diagnostics)
             lints = frozenset(filter(is_lint, sections()[LANGUAGE]))  # which of them are off is unknown
             return sorted(folder.glob("*.rcl")), lints
-        found.extend(faults)
+        found.extend(_as_told(d, folder) for d in faults)
         given = Path.cwd() / folder
         names = [folder / f.relative_to(given) if f.is_relative_to(given) else f for f in plan.contract_files]
         return names, plan.off
@@ -155,12 +156,14 @@ def _of_plan(folder: Path, shelf: Shelf) -> Iterator[Diagnostic]:
 
 
 def _as_told(found: Diagnostic, folder: Path) -> Diagnostic:
-    """The diagnostic with its path under the folder as given to the command; tools get absolute ones."""
-    if found.span is None or not Path(found.span.file).is_absolute():
-        return found
-    path, root = Path(found.span.file), folder.resolve()
-    file = folder / path.relative_to(root) if path.is_relative_to(root) else path
-    return replace(found, span=replace(found.span, file=str(file)))
+    """The diagnostic with its paths under the folder as given to the command; tools get absolute ones."""
+
+    def near(span: Span | None) -> Span | None:
+        if span is None or not Path(span.file).is_relative_to(folder.resolve()):
+            return span
+        return replace(span, file=str(folder / Path(span.file).relative_to(folder.resolve())))
+
+    return replace(found, span=near(found.span), notes=tuple((text, near(span)) for text, span in found.notes))
 
 
 def _off(folder: Path) -> frozenset[str]:

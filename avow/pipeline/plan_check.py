@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -93,13 +94,14 @@ def of_rest(folder: Path) -> tuple[Diagnostic, ...]:
     rest = rest_of(folder)
     if rest is None:
         return ()
-    found = [*_policy(rest.system), *unknown_types(rest.system.plan, rest.system.contract)]
+    types = unknown_types(rest.system.plan, rest.system.contract)
+    found = [*_policy(rest.system), *(d for d in types if not rest.may_follow(d))]
     plan, contract, _ = heard(rest.system.plan, rest.system.contract)
     system = replace(rest.system, plan=plan, contract=contract)
     for node in rest.system.plan.nodes:
         for method in node.methods:
             try:
-                found += _method(system, node.node, method, follows=rest.may_follow)
+                found += _method(system, node.node, method, follows=partial(rest.may_follow, node=node.node))
             except Rejected as rejected:
                 found += rejected.diagnostics
             except Exception:

@@ -31,6 +31,7 @@ _WORD = re.compile(r"\w+'*")
 _STRING = re.compile(r'"[^"\n]*"|//[^\n]*')
 _OF_NAMES = re.compile("RCL[23]")
 _QUOTED = re.compile(r"'([^']*)'")
+_KEY = re.compile(r"\b(\w+)[:`]")
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,10 +48,16 @@ class Rest:
     """The faults in the plan's own values, and in the contract."""
     doubtful: frozenset[str] = frozenset()
     """Names of the contract that may be missing only because of a fault in it."""
+    wrong: frozenset[tuple[str | int, ...]] = frozenset()
+    """The paths of the plan's faulty values."""
 
-    def may_follow(self, found: Diagnostic) -> bool:
-        """Whether a finding of a method's tool about its files may follow from a fault of the contract."""
-        return not self.doubtful.isdisjoint(_WORD.findall(found.message))
+    def may_follow(self, found: Diagnostic, node: str = "") -> bool:
+        """Whether a finding (about a node's method) may follow from a reported fault: of the contract, or of a value of
+        the plan whose key is its remedy."""
+        meant = _KEY.findall(found.hint or "")
+        near = (path for path in self.wrong if path[0] != "nodes" or path[1:2] == (node,))
+        keys = {[step for step in path if isinstance(step, str)][-1] for path in near}
+        return not keys.isdisjoint(meant) or not self.doubtful.isdisjoint(_WORD.findall(found.message))
 
 
 def rest_of(folder: Path) -> Rest | None:
@@ -58,16 +65,16 @@ def rest_of(folder: Path) -> Rest | None:
     from avow.language.load import check_paths, read_in_part
 
     try:
-        plan, root, faults, dropped = read_rest(folder / "plan.yaml")
+        plan, root, faults, dropped, wrong = read_rest(folder / "plan.yaml")
     except Rejected:
         return None
     contract, found = check_paths(plan.contract_files)
     faults += tuple(d for d in found if d.is_error)
     if contract is not None:
-        return Rest(System(plan, contract), True, root, dropped, faults)
+        return Rest(System(plan, contract), True, root, dropped, faults, wrong=wrong)
     words = frozenset(word for path in plan.contract_files for word in _WORD.findall(_text(path)))
     part = read_in_part(plan.contract_files)
-    return Rest(System(plan, part), False, root, dropped | words, faults, _doubtful(plan, part, found))
+    return Rest(System(plan, part), False, root, dropped | words, faults, _doubtful(plan, part, found), wrong)
 
 
 def every_fault(folder: Path, found: Iterable[Diagnostic]) -> tuple[Diagnostic, ...]:
@@ -117,7 +124,7 @@ def _of_names(rest: Rest) -> Iterator[Diagnostic]:
     plan, unlike = started(plan, contract)
     yield from unlike
     plan, contract, unclear = heard(plan, contract)
-    yield from unclear
+    yield from unclear if _linked(plan) else ()
     wrong = check_subsystems(plan, contract)
     yield from wrong
     if wrong or plan.subsystems:
@@ -129,7 +136,13 @@ def _of_names(rest: Rest) -> Iterator[Diagnostic]:
 def _of_formulas(plan: Plan, contract: Contract) -> tuple[Diagnostic, ...]:
     system = completed(plan, contract)
     graph = dataflow(system)
-    return tuple(d for d in graph.findings if d.is_error) + check_formulas(system, graph)
+    unclear = tuple(d for d in graph.findings if d.is_error) if _linked(plan) else ()
+    return unclear + check_formulas(system, graph)
+
+
+def _linked(plan: Plan) -> bool:
+    """Whether the topics' names are known: a broken launch file may remap them."""
+    return plan.launched is None or not plan.launched.is_broken
 
 
 def _syntax(plan: Plan) -> Iterator[Diagnostic]:

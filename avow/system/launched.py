@@ -15,6 +15,7 @@ import yaml
 
 from avow.base.diagnostics import Diagnostic, Severity, Span
 from avow.base.files import inside, read_regular
+from avow.base.plain import count
 from avow.base.suggestions import nearby, nearest, suggest
 from avow.base.workspace import find_workspace
 from avow.language.contract import Contract, Node
@@ -47,10 +48,11 @@ def read_launched(plan: Path, pieces: Iterable[Piece]) -> tuple[Launched | None,
             given = piece.at("args")
             entries = (given.entries or {}) if given is not None else {}
             files.append((path, {name: _value(value) for name, value in entries.items()}))
-    if not files:
-        return None, tuple(faults)
+    if not files and not faults:
+        return None, ()
     found = read_launch(files, root)
-    return found, (*faults, *(d for d in found.unread if d.is_error))
+    found = replace(found, unread=(*faults, *found.unread))
+    return found, tuple(d for d in found.unread if d.is_error)
 
 
 def _value(piece: Piece) -> str:
@@ -59,7 +61,7 @@ def _value(piece: Piece) -> str:
 
 def started(plan: Plan, contract: Contract) -> tuple[Plan, tuple[Diagnostic, ...]]:
     """The plan with the names and remappings of its launch files, and the disagreements between them."""
-    if plan.launched is None:
+    if plan.launched is None or plan.launched.is_broken:
         return plan, ()
     faults: list[Diagnostic] = []
     placed = dict(plan.ros.names.nodes)
@@ -145,12 +147,18 @@ def told(system: System) -> Iterator[Diagnostic]:
     named += [*model.get("dropped", {})]
     spoken = {name.lstrip("/") for name in named}
     known: dict[str, str] = {}
+    runs: list[tuple[str, Span | None]] = []
     for node in system.contract.nodes:
         placed = system.plan.ros.names.placed(node.name)
         one = next((s for s in launched.nodes if s.name == placed.name), None)
         if one is not None:
             known[one.name] = node.name
-            yield _runs(node, placed, one)
+            said = _runs(node, placed)
+            if one.unread:
+                doubts = "; ".join(one.unread)
+                yield Diagnostic("ROS121", f"{said}; but {doubts}", one.span, Severity.WARNING)
+            else:
+                runs.append((said, one.span))
             if any(entry.node == node.name and entry.source and entry.source.python for entry in system.plan.nodes):
                 yield from _started_with(one)[1]
         elif not node.relay and node.name not in (*model.get("compound", {}), *model.get("external", {})):
@@ -164,15 +172,14 @@ def told(system: System) -> Iterator[Diagnostic]:
             what = f" ({one.kind})" if one.kind else ""
             message = f"{one.name}{what} is started, and is neither a node of the contract nor named under `model`"
             yield Diagnostic("ROS124", message, one.span, Severity.WARNING, "model: {dropped: {NAME: why}}")
+    if runs:
+        message = f"the launch files start {count(len(runs), 'node')} of the contract"
+        yield Diagnostic("ROS125", message, runs[0][1], Severity.NOTE, notes=tuple(runs))
 
 
-def _runs(node: Node, placed: Placed, one: Started) -> Diagnostic:
+def _runs(node: Node, placed: Placed) -> str:
     remaps = ", ".join(f"{old} → {new}" for old, new in placed.remaps)
-    message = f"{node.name} runs as {placed.name}" + (f", with {remaps}" if remaps else "")
-    doubts = "; ".join(one.unread)
-    if doubts:
-        return Diagnostic("ROS121", f"{message}; but {doubts}", one.span, Severity.WARNING)
-    return Diagnostic("ROS125", message, one.span, Severity.NOTE)
+    return f"{node.name} runs as {placed.name}" + (f", with {remaps}" if remaps else "")
 
 
 def _texts(members: object) -> list[str]:

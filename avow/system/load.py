@@ -104,6 +104,8 @@ def _linked(
         raise Rejected(*faults)
     plan, more = started(plan, contract)
     faults += more
+    if any(fault.is_error for fault in faults):
+        raise Rejected(*faults)
     plan, contract, more = heard(plan, contract)
     faults += more
     wrong = check_subsystems(plan, contract)

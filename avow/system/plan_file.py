@@ -65,9 +65,12 @@ def read_plan(
     return reader.plan(), root, tuple(reader.faults)
 
 
-def read_rest(path: Path) -> tuple[Plan, Piece, tuple[Diagnostic, ...], frozenset[str]]:
-    """As `read_plan`, without the pieces whose shape is wrong, and with the words in those: for finding further faults,
-    never for verifying. Raises Rejected if the file is no document, or nothing of it is left."""
+def read_rest(
+    path: Path,
+) -> tuple[Plan, Piece, tuple[Diagnostic, ...], frozenset[str], frozenset[tuple[str | int, ...]]]:
+    """As `read_plan`, without the pieces whose shape is wrong, with the words in those, and with the paths of all
+    faulty values: for finding further faults, never for verifying. Raises Rejected if the file is no document, or
+    nothing of it is left."""
     root, faults = _document(path)
     faults += check_shape(root)
     rest, dropped = without_faults(root)
@@ -75,7 +78,10 @@ def read_rest(path: Path) -> tuple[Plan, Piece, tuple[Diagnostic, ...], frozense
         raise Rejected(*faults)
     reader = _PlanReader(path, rest)
     plan = reader.plan()
-    return plan, rest, (*faults, *reader.faults), dropped
+    faults += tuple(reader.faults)
+    places = {fault.span for fault in faults}
+    wrong = frozenset(at for at, span in root.located().spans.items() if at and span in places)
+    return plan, rest, faults, dropped, wrong
 
 
 def _document(path: Path) -> tuple[Piece, tuple[Diagnostic, ...]]:

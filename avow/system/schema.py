@@ -12,7 +12,7 @@ from typing import Any
 from avow.base.diagnostics import Diagnostic, Span
 from avow.base.packaged import packaged
 from avow.base.remembered import Shelf
-from avow.base.suggestions import suggest
+from avow.base.suggestions import did_you_mean, suggest
 from avow.base.tools import package_version
 from avow.base.tuning.sizes import REPAIR_ROUNDS
 from avow.system.plan import Located
@@ -173,7 +173,9 @@ def _explain(error: Any, root: Piece, whole: str, also: Iterable[Any] = ()) -> I
                 yield fault(f"{allowed[0]} is wanted, not {given}{wanted}", hint=f"write `{allowed[0]}`")
                 return
             word = _VERSIONS.get(str(error.instance), error.instance)
-            hint = f"write `{word}`" if word in allowed else suggest(word, allowed) if isinstance(word, str) else None
+            hint = (
+                f"write `{word}`" if word in allowed else did_you_mean(word, allowed) if isinstance(word, str) else None
+            )
             yield fault(f"{given} is not one of {', '.join(allowed)}", hint=hint)
         case "type":
             kinds = error.validator_value if isinstance(error.validator_value, list) else [error.validator_value]

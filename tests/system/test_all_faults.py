@@ -23,7 +23,7 @@ context { Mode : {heat, idle}; Low = 18; }
 node thermometer {
   inputs( raw : REAL )
   outputs( temperature : REAL )
-  topics( std_msgs/Float64 raw matches(in.raw), a/B temperature matches(out.temperature) )
+  topics( robot/Reading raw matches(in.raw), a/B temperature matches(out.temperature) )
   assume plausible ( -40 <= in.raw <= 85 )
   guarantee calibrated ( out.temperature == in.raw )
 }
@@ -38,6 +38,8 @@ node thermostat {
 """
 PLAN = """\
 system: home
+ros: {distro: noetic}
+messages: [robot]
 requirements:
   REQ1:
     text: A cold room is heated.
@@ -53,7 +55,7 @@ nodes:
     criticality: low
     methods:
       - hypothesis: {subject: "read.py:read", cases: 50}
-      - rosmonitoring: {traces: [run.jsonl], mapping: {in.raw: data, out.temperature: data}}
+      - rosmonitoring: {traces: [run.jsonl], mapping: {in.raw: degrees, out.temperature: data}}
   thermostat:
     criticality: high
     methods:
@@ -66,7 +68,9 @@ INPUTS = {
     "control.imp": "IF (temperature < 18) THEN\n   mode := heat\nELSE\n   mode := idle\n",
     "review.yaml": "format: 1\nnode: thermostat\nreviewer: A. Person\nrole: engineer\ndate: 2026-11-20\n"
     "read:\n  - {file: control.imp}\nchecklist:\n  - {question: Is it short, answer: yes}\nconclusion: accepted\n",
-    "run.jsonl": '{"topic": "raw", "msg": {"data": 1.0}, "time": 1.0}\n',
+    "run.jsonl": '{"topic": "raw", "msg": {"degrees": 1.0}, "time": 1.0}\n',
+    "robot/Reading.msg": "Header header\nfloat64 degrees\n",
+    "robot.py": "import rclpy\n\n\nclass Robot(rclpy.node.Node):\n    pass\n",
 }
 """What the methods read."""
 
@@ -81,12 +85,19 @@ FAULTS: dict[str, tuple[str, str, str, str]] = {
     "no such guarantee of a method": ("plan.yaml", "cases: 50", "cases: 50, guarantees: [calibratd]", "PLAN106"),
     "no such node": ("plan.yaml", "[thermometer, thermostat]", "[thermometer, boiler]", "PLAN106"),
     "no such level": ("plan.yaml", "criticality: high", "criticality: huge", "PLAN105"),
+    "no such distribution": ("plan.yaml", "distro: noetic", "distro: noetik", "PLAN105"),
+    "no such kind": (
+        "plan.yaml",
+        "review.yaml}",
+        "review.yaml}\n      - hypothesis\n    source: {python: robot.py, class: Robot, kind: ros2}",
+        "PLAN105",
+    ),
     "no such policy": ("plan.yaml", "policy: default", "policy: defalt", "POLICY001"),
     "no Python": ("read.py", "def read(raw):", "def read(raw:", "HYPO103"),
     "no program": ("control.imp", "THEN", "THAN", "HOARE100"),
     "no verdict of a review": ("review.yaml", "conclusion: accepted", "conclusion: maybe", "REV"),
     "wrong option": ("plan.yaml", "cases: 50", "cases: many", "PLAN105"),
-    "wrong mapping": ("plan.yaml", "in.raw: data", "in.row: data", "MON101"),
+    "wrong mapping": ("plan.yaml", "in.raw: degrees", "in.row: degrees", "MON101"),
     "no formula": ("plan.yaml", '"-40 <= in.raw <= 85"', '"-40 <= in.raw <="', "RCL120"),
 }
 
@@ -99,6 +110,7 @@ def place(folder: Path, faults: list[str]) -> Path:
         texts[file] = texts[file].replace(good, bad)
     folder.mkdir(parents=True, exist_ok=True)
     for file, text in texts.items():
+        (folder / file).parent.mkdir(exist_ok=True)
         (folder / file).write_text(text)
     return folder
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
+from helpers import avow
 
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.cli import main
@@ -70,7 +72,7 @@ def test_arguments_of_a_launch_file(tmp_path: Path) -> None:
             APART.replace("</launch>", '<node ns="right" name="a" pkg="p" type="a"/></launch>'),
             [],
         ),
-        ("", "<launch><node</launch>", ["ROS120"]),
+        ("  nodes: {a: {name: /c}, b: {remap: {u: /right/t}}}", "<launch><node</launch>", ["ROS120"]),
     ],
 )
 def test_what_does_not_agree_is_told(tmp_path: Path, plan: str, launch: str, codes: list[str]) -> None:
@@ -82,6 +84,8 @@ def test_what_does_not_agree_is_told(tmp_path: Path, plan: str, launch: str, cod
         found = rejected.diagnostics
     assert [d.code for d in found] == codes
     assert all(d.span is not None for d in found)
+    printed = avow("check", "contracts/s", cwd=tmp_path).stdout
+    assert re.findall(r"^\w+\[(ROS12[023])\]", printed, re.MULTILINE) == codes, "each once, and nothing that follows"
 
 
 @pytest.mark.parametrize(
@@ -91,16 +95,17 @@ def test_what_does_not_agree_is_told(tmp_path: Path, plan: str, launch: str, cod
         (
             APART.replace("</launch>", '<node name="rviz" pkg="rviz" type="rviz"/></launch>'),
             [
+                "/rviz (rviz/rviz) is started, and is neither a node of the contract nor named under `model`",
                 "a runs as /left/a",
                 "b runs as /b, with u → /left/t",
-                "/rviz (rviz/rviz) is started, and is neither a node of the contract nor named under `model`",
             ],
         ),
-        ('<launch><node name="a" pkg="p" type="a"/></launch>', ["a runs as /a", "no launch file starts b"]),
+        ('<launch><node name="a" pkg="p" type="a"/></launch>', ["no launch file starts b", "a runs as /a"]),
     ],
 )
 def test_check_says_how_each_node_runs(tmp_path: Path, launch: str, expected: list[str]) -> None:
-    assert [d.message for d in told(load_system(make(tmp_path, LAUNCH, launch)))] == expected
+    *found, runs = told(load_system(make(tmp_path, LAUNCH, launch)))
+    assert [*(d.message for d in found), *(text for text, _ in runs.notes)] == expected
 
 
 def test_paths_stay_in_the_workspace(tmp_path: Path) -> None:

@@ -57,6 +57,11 @@ class Launched:
     unread: tuple[Diagnostic, ...] = ()
     files: tuple[Path, ...] = ()
 
+    @property
+    def is_broken(self) -> bool:
+        """Whether a file is missing or no launch file, so that nothing follows from what the others start."""
+        return any(found.is_error for found in self.unread)
+
 
 def read_launch(files: Iterable[tuple[Path, Mapping[str, str]]], root: Path) -> Launched:
     """The nodes that launch files start, each file with the values of its arguments; included files are read if they
