@@ -14,9 +14,16 @@ from typing import Any
 SECTION = "ros__parameters"
 SLIP = SECTION.replace("__", "_")
 
+Path = tuple[str, ...]
+"""Keys of mappings within mappings."""
+
 
 class WrongParameters(Exception):  # noqa: N818 - it is what was found wrong
-    """A file whose parameters for a node cannot be determined."""
+    """A file whose parameters for a node cannot be determined; `path`: the keys that lead to the fault."""
+
+    def __init__(self, text: str, path: Path = ()) -> None:
+        super().__init__(text)
+        self.path = path
 
 
 def is_sectioned(data: object) -> bool:
@@ -28,33 +35,47 @@ def is_sectioned(data: object) -> bool:
 def of_node(data: Mapping[str, Any], name: str) -> dict[str, Any]:
     """The parameters that a file sets for the node of a whole name, by their dotted names; a later entry takes
     precedence over an earlier one. Raises WrongParameters."""
-    found: dict[str, Any] = {}
+    return {key: value for key, (value, _) in placed(data, name).items()}
+
+
+def placed(data: Mapping[str, Any], name: str) -> dict[str, tuple[Any, Path]]:
+    """The same with the keys that lead to each value; of a plain mapping, all of it."""
+    if not is_sectioned(data):
+        return {".".join(map(str, path)): (value, path) for path, value in _leaves(data, ())}
+    found: dict[str, tuple[Any, Path]] = {}
     own: dict[str, str] = {}
-    entries = list(_entries(data, ""))
-    for entry, section in entries:
+    entries = list(_entries(data, "", ()))
+    for entry, section, above in entries:
         if not _matches(entry, name):
             continue
-        for key, value in flat(section):
-            if "*" in entry and key in own and found[key] != value:
+        for path, value in _leaves(section, above):
+            key = ".".join(map(str, path[len(above) :]))
+            if "*" in entry and key in own and found[key][0] != value:
                 raise WrongParameters(
-                    f"{entry} sets {key} to {value!r} after {own[key]} has set it to {found[key]!r}, and client "
-                    "libraries do not agree which of them counts: put the wildcard first"
+                    f"{entry} sets {key} to {value!r} after {own[key]} has set it to {found[key][0]!r}, and client "
+                    "libraries do not agree which of them counts: put the wildcard first",
+                    path,
                 )
             if "*" not in entry:
                 own[key] = entry
-            found[key] = value
-    if not any(_matches(entry, name) for entry, _ in entries):
-        raise WrongParameters(f"it sets nothing for {name}, but for {', '.join(entry for entry, _ in entries)}")
+            found[key] = value, path
+    if not any(_matches(entry, name) for entry, _, _ in entries):
+        others = ", ".join(entry for entry, _, _ in entries)
+        raise WrongParameters(f"it sets nothing for {name}, but for {others}", entries[0][2][:-1] if entries else ())
     return found
 
 
-def flat(section: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, Any]]:
+def flat(section: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
     """Parameters by their dotted names."""
+    return ((".".join(map(str, path)), value) for path, value in _leaves(section, ()))
+
+
+def _leaves(section: Mapping[str, Any], above: Path) -> Iterator[tuple[Path, Any]]:
     for key, value in section.items():
         if isinstance(value, Mapping):
-            yield from flat(value, f"{before}{key}.")
+            yield from _leaves(value, (*above, key))
         else:
-            yield f"{before}{key}", value
+            yield (*above, key), value
 
 
 def nested(settings: Mapping[str, Any]) -> dict[str, Any]:
@@ -71,23 +92,24 @@ def nested(settings: Mapping[str, Any]) -> dict[str, Any]:
     return whole
 
 
-def _entries(data: Mapping[str, Any], before: str) -> Iterator[tuple[str, Mapping[str, Any]]]:
+def _entries(data: Mapping[str, Any], before: str, above: Path) -> Iterator[tuple[str, Mapping[str, Any], Path]]:
     for key, value in data.items():
-        name = f"{before}/{str(key).strip('/')}"
+        name, path = f"{before}/{str(key).strip('/')}", (*above, key)
         if key == SLIP:
-            raise WrongParameters(f"{before or '/'} has `{SLIP}`: write `{SECTION}`, with two underscores")
+            raise WrongParameters(f"{before or '/'} has `{SLIP}`: write `{SECTION}`, with two underscores", path)
         if not isinstance(value, Mapping):
             raise WrongParameters(
-                f"{name} is neither a node with `{SECTION}` nor a namespace: write `ros__parameters:` above it"
+                f"{name} is neither a node with `{SECTION}` nor a namespace: write `ros__parameters:` above it", path
             )
         if SECTION not in value:
-            yield from _entries(value, name)
+            yield from _entries(value, name, path)
         elif len(value) > 1:
-            raise WrongParameters(f"{name} has other keys beside `{SECTION}`")
+            other = next(each for each in value if each != SECTION)
+            raise WrongParameters(f"{name} has other keys beside `{SECTION}`", (*path, other))
         elif not isinstance(value[SECTION], Mapping | None):
-            raise WrongParameters(f"`{SECTION}` of {name} is no mapping")
+            raise WrongParameters(f"`{SECTION}` of {name} is no mapping", (*path, SECTION))
         else:
-            yield name, value[SECTION] or {}
+            yield name, value[SECTION] or {}, (*path, SECTION)
 
 
 def _matches(entry: str, name: str) -> bool:

@@ -6,6 +6,7 @@ name. The plan has to agree: a topic that the two resolve differently is an erro
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -22,7 +23,7 @@ from avow.language.contract import Contract, Node
 from avow.ros.launch import Launched, Setting, Started, read_launch
 from avow.ros.names import Placed, Resolver
 from avow.ros.parameters import WrongParameters, flat, is_sectioned, of_node
-from avow.system.node_plan import parameters
+from avow.system.node_plan import parameter_place, parameters
 from avow.system.plan import Plan, System
 from avow.system.strict_yaml import Piece
 
@@ -86,7 +87,10 @@ def _parameters(plan: Plan, node: Node, launched: Started) -> Iterator[Diagnosti
         return  # reported where the class is examined
     here = dict(flat(mine))
     there, unread = _started_with(launched)
-    place = source.place.at("source", "parameters")
+
+    def place(name: str) -> Span:
+        return parameter_place(plan.root, source, launched.name, name)
+
     alone = sorted(here.keys() - there.keys()) if there and not unread else []
     for name, (value, span) in there.items():
         if here.get(name) != value or isinstance(here[name], bool) is not isinstance(value, bool):
@@ -96,10 +100,10 @@ def _parameters(plan: Plan, node: Node, launched: Started) -> Iterator[Diagnosti
             alone = [other for other in alone if other not in meant]
             hint = "write what the robot is started with into the file that the plan names:  source: {parameters: …}"
             hint = f"the plan has `{meant[0]}`: correct the one that is wrong" if meant else hint
-            yield Diagnostic("ROS127", message, place, hint=hint, notes=((_at(span), span),))
+            yield Diagnostic("ROS127", message, place(name), hint=hint, notes=((_at(span), span),))
     for name in alone:
         message = f"the plan sets {name} of {node.name}, and {_at(launched.span)} starts it without"
-        yield Diagnostic("ROS127", message, place, hint="leave it out, or launch with it")
+        yield Diagnostic("ROS127", message, place(name), hint="leave it out, or launch with it")
 
 
 def _started_with(launched: Started) -> tuple[dict[str, tuple[Any, Span]], tuple[Diagnostic, ...]]:
@@ -110,7 +114,9 @@ def _started_with(launched: Started) -> tuple[dict[str, tuple[Any, Span]], tuple
         try:
             there |= {name: (value, setting.span) for name, value in _set(setting, launched.name)}
         except (OSError, ValueError, yaml.YAMLError, WrongParameters) as error:
-            what = setting.name or setting.value or "a file"
+            what = setting.name or os.path.normpath(setting.value or "a file")
+            if isinstance(error, yaml.MarkedYAMLError) and error.problem_mark:
+                error = ValueError(f"line {error.problem_mark.line + 1}: {error.problem}")
             message = f"{launched.name} is started with the parameters of {what}, which are not read: {error}"
             if setting.name:
                 message = f"{launched.name} is started with the parameter {what}, which is not read: {error}"
@@ -159,8 +165,9 @@ def told(system: System) -> Iterator[Diagnostic]:
                 yield Diagnostic("ROS121", f"{said}; but {doubts}", one.span, Severity.WARNING)
             else:
                 runs.append((said, one.span))
-            if any(entry.node == node.name and entry.source and entry.source.python for entry in system.plan.nodes):
-                yield from _started_with(one)[1]
+            source = next((entry.source for entry in system.plan.nodes if entry.node == node.name), None)
+            if source and source.python and not parameters(system.plan.root, source, one.name)[1]:
+                yield from _started_with(one)[1]  # else the same file may be reported for its own faults
         elif not node.relay and node.name not in (*model.get("compound", {}), *model.get("external", {})):
             message = f"no launch file starts {node.name}"
             names = [s.name for s in launched.nodes if s.name]

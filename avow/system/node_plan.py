@@ -14,12 +14,12 @@ from typing import Any
 
 import yaml
 
-from avow.base.diagnostics import Diagnostic, Rejected, Severity
+from avow.base.diagnostics import Diagnostic, Rejected, Severity, Span
 from avow.base.files import inside, read_regular
 from avow.base.suggestions import suggest
 from avow.language.contract import Node
 from avow.language.sorts import BoolSort, EnumSort, IntegerSort, NaturalSort, RealSort
-from avow.ros.parameters import WrongParameters, flat, is_sectioned, nested, of_node
+from avow.ros.parameters import WrongParameters, flat, is_sectioned, nested, placed
 from avow.system.plan import Driving, Method, Numbers, Plan, Source
 from avow.system.strict_yaml import Piece, read_yaml
 
@@ -140,26 +140,45 @@ def parameters(root: Path, source: Source, name: str) -> tuple[Mapping[str, Any]
     another reader may interpret differently is rejected."""
     if not source.parameters:
         return {}, ()
+    try:
+        values, found = _settings(root, source, name)
+    except Rejected as rejected:
+        return {}, rejected.diagnostics
+    told = ((_unclear(piece, value, key), piece.span) for key, (value, piece) in found.items())
+    return values, tuple(Diagnostic("PLAN130", f"`{source.parameters}`: {why}", span) for why, span in told if why)
+
+
+def parameter_place(root: Path, source: Source, name: str, key: str) -> Span:
+    """Where the parameter file sets a parameter of the node of this whole name; otherwise where the plan names it."""
+    with contextlib.suppress(Rejected, KeyError):
+        return _settings(root, source, name)[1][key][1].span
+    return source.place.at("source", "parameters")
+
+
+def _settings(root: Path, source: Source, name: str) -> tuple[Mapping[str, Any], dict[str, tuple[Any, Piece]]]:
+    """The parameters, and each one's value with its place, by its dotted name. Raises Rejected."""
     place, path = source.place.at("source", "parameters"), inside(root, source.parameters)
     try:
         assert path is not None
         piece, faults, loaded = _read(read_regular(path), str(path))
-    except Rejected as rejected:
-        return {}, rejected.diagnostics
     except (OSError, AssertionError, ValueError, yaml.YAMLError, RecursionError) as error:
-        return {}, (Diagnostic("PLAN130", f"`{source.parameters}` cannot be read: {error}", place),)
+        raise Rejected(Diagnostic("PLAN130", f"`{source.parameters}` cannot be read: {error}", place)) from None
     if faults:
-        return {}, faults
+        raise Rejected(*faults)
     if not isinstance(loaded, dict):
-        return {}, (Diagnostic("PLAN130", f"`{source.parameters}` is no mapping", place),)
-    strict = piece.data
-    if is_sectioned(loaded):
-        try:
-            strict, loaded = (nested(of_node(data, name)) for data in (strict, loaded))
-        except WrongParameters as unclear:
-            return {}, (Diagnostic("PLAN130", f"`{source.parameters}`: {unclear}", place),)
-    wrong = tuple(Diagnostic("PLAN130", f"`{source.parameters}`: {why}", place) for why in _unclear(strict, loaded, ""))
-    return loaded, wrong
+        raise Rejected(Diagnostic("PLAN130", f"`{source.parameters}` is no mapping", piece.span))
+    try:
+        found = placed(loaded, name)
+        values = nested({key: value for key, (value, _) in found.items()}) if is_sectioned(loaded) else loaded
+    except WrongParameters as unclear:
+        above = piece.at(*unclear.path[:-1]) or piece
+        span = above.key_span(unclear.path[-1]) if unclear.path else piece.span
+        raise Rejected(Diagnostic("PLAN130", f"`{source.parameters}`: {unclear}", span)) from None
+    odd = [key for key, (_, path) in found.items() if piece.at(*path) is None]
+    if odd:
+        text = f"`{source.parameters}`: the keys of {odd[0]} are no plain texts"
+        raise Rejected(Diagnostic("PLAN130", text, piece.span, hint="put them in quotes"))
+    return values, {key: (value, piece.at(*path) or piece) for key, (value, path) in found.items()}
 
 
 @functools.lru_cache(16)
@@ -176,31 +195,27 @@ def never_read(plan: Plan) -> Iterator[Diagnostic]:
         if source is None or not source.python or not source.parameters or source.kind is Driving.RCLPY:
             continue
         path = plan.root / source.python
-        values, _ = parameters(plan.root, source, plan.ros.names.placed(entry.node).name)
+        name = plan.ros.names.placed(entry.node).name
+        values, _ = parameters(plan.root, source, name)
         with contextlib.suppress(OSError):
             text = b" ".join(read_regular(file) for file in path.parent.glob("*.py"))
-            for name, _ in flat(values):
-                lost = [part for part in name.split(".") if not re.search(rf"\b{re.escape(part)}\b".encode(), text)]
+            for key, _ in flat(values):
+                lost = [part for part in key.split(".") if not re.search(rf"\b{re.escape(part)}\b".encode(), text)]
                 if lost:
-                    message = f"`{source.parameters}` sets {name}; no Python file beside {path.name} has `{lost[0]}`"
-                    span = source.place.at("source", "parameters")
+                    message = f"`{source.parameters}` sets {key}; no Python file beside {path.name} has `{lost[0]}`"
+                    span = parameter_place(plan.root, source, name, key)
                     yield Diagnostic("PLAN136", message, span, Severity.WARNING, "correct its name, or remove it")
 
 
-def _unclear(strict: Any, loaded: Any, where: str) -> Iterator[str]:
-    """Where YAML's own reader interprets a text differently from its appearance, or a value is no parameter's."""
-    if isinstance(loaded, dict):
-        if not isinstance(strict, dict) or set(strict) != set(loaded):
-            yield f"{where or 'the mapping'} has keys that are no plain texts"
-            return
-        for key, value in loaded.items():
-            yield from _unclear(strict[key], value, f"{where}.{key}" if where else key)
-    elif isinstance(loaded, bool | int | float | str):
-        if isinstance(loaded, float) and not math.isfinite(loaded):
-            yield f"{where} is {loaded}, which is no REAL"
-        elif type(strict) is not type(loaded) and not (type(strict) is int and type(loaded) is float):
-            yield f"{where} is read as {loaded!r} by some, and as {strict!r} by others: write it in quotes, or plainly"
-        elif strict != loaded:
-            yield f"{where} is read as {loaded!r} by some, and as {strict!r} by others"
-    elif loaded is not None or strict is not None:
-        yield f"{where} is a {type(loaded).__name__}; numbers, truth values, texts and mappings of them are parameters"
+def _unclear(piece: Piece, loaded: Any, where: str) -> str:
+    """How YAML's own reader interprets a text differently from its appearance, or that a value is no parameter's; else
+    empty."""
+    strict = piece.data
+    if not isinstance(loaded, bool | int | float | str):
+        kinds = "numbers, truth values, texts and mappings of them are parameters"
+        return "" if loaded is strict is None else f"{where} is a {type(loaded).__name__}; {kinds}"
+    if isinstance(loaded, float) and not math.isfinite(loaded):
+        return f"{where} is {loaded}, which is no REAL"
+    if type(strict) is not type(loaded) and not (type(strict) is int and type(loaded) is float):
+        return f"{where} is read as {loaded!r} by some, and as {strict!r} by others: write it in quotes, or plainly"
+    return "" if strict == loaded else f"{where} is read as {loaded!r} by some, and as {strict!r} by others"

@@ -139,6 +139,7 @@ _PROBLEMS = (
         "check the indentation of this line and of the line before, or put the text in quotes",
     ),
     (r"could not find expected ':'", "a key without its `:`", "write `key: value`"),
+    (r"expected <block end>, but found '([\]}])'", "a `{0}` closes no bracket", "remove it, or open the bracket"),
     (
         r"expected <block end>, but found '(.*)'",
         "this line is indented as none above it",

@@ -167,6 +167,8 @@ def test_a_class_has_the_parameters_that_ros2_reads(tmp_path: Path, parameters: 
     done = drive(folder, "watch", trace(tmp_path), "-o", recording)
     if told_:
         assert told_ in told(done)
+        assert isinstance(done.exception, Rejected)
+        assert all(d.span and Path(d.span.file).name == "params.yaml" for d in done.exception.diagnostics)
     else:
         assert recording.read_text(encoding="utf-8").count('"data": "red"') == reds
 

@@ -69,11 +69,26 @@ def test_faults(node: str, code: str, words: str, tmp_path: Path) -> None:
     assert any(d.code == code and words in d.message for d in caught.value.diagnostics), caught.value.diagnostics
 
 
-@pytest.mark.parametrize("text", ["[1, 2]\n", "timeout: off\n", "timeout: 1:30\n"])
-def test_parameters_that_are_no_plain_mapping(text: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("text", "line", "column"),
+    [
+        ("[1, 2]\n", 1, 1),
+        ("timeout: off\n", 1, 10),
+        ("pid:\n  p: 1:30\n", 2, 6),
+        ("1: a\n", 1, 1),
+        ("/m:\n  ros__parameters: {t: off}\n/n:\n  ros__parameters: {t: off}\n", 4, 24),
+        ("/m:\n  ros__parameters: {t: 1}\n", 1, 1),
+        ("/n:\n  ros_parameters: {t: 1}\n", 2, 3),
+        ("/n:\n  ros__parameters: {t: 1}\n  t: 2\n", 3, 3),
+    ],
+)
+def test_parameters_that_are_no_plain_mapping(text: str, line: int, column: int, tmp_path: Path) -> None:
+    """At the value in the parameter file."""
     (tmp_path / "p.yaml").write_text(text)
     _, faults = parameters(tmp_path, Source("src.py", "Watchdog", "", "p.yaml", Numbers.FLOAT64, {}), "/n")
-    assert {d.code for d in faults} == {"PLAN130"}
+    assert [(d.code, Path(d.span.file).name, d.span.line, d.span.column) for d in faults if d.span] == [
+        ("PLAN130", "p.yaml", line, column)
+    ]
 
 
 @pytest.mark.parametrize("kind", ["", ", kind: rospy"])

@@ -28,7 +28,7 @@ from avow.ros.bags import fields_of
 from avow.ros.calls import CALL, is_part
 from avow.ros.definitions import HEADER, INTEGERS, Array, Definitions, Field, Message, Nested, Scalar, Wire, canonical
 from avow.ros.sources import definitions, require
-from avow.system.node_plan import parameters
+from avow.system.node_plan import parameter_place, parameters
 from avow.system.plan import Driving, Source, System
 from avow.system.topics import whole_name
 
@@ -237,7 +237,10 @@ def driver(system: System, name: str) -> Driver:
     text = "".join(read_text(file, "utf-8", errors="replace") for file in sorted(read) if file.is_relative_to(root))
     found = Driver(system, node, source, subject, known, topics, text)
     if found.topics.wrong:
-        raise _refused(source, f"{source.class_name} cannot be constructed: {found.topics.wrong}")
+        text = f"{source.class_name} cannot be constructed: {found.topics.wrong}"
+        if key := re.search(r"the parameter (\S+) is ", found.topics.wrong):
+            raise Rejected(Diagnostic("DRIVE103", text, parameter_place(root, source, placed.name, key[1])))
+        raise _refused(source, text)
     if wrong := tuple(found.fits()):
         raise Rejected(*wrong)
     return found
@@ -287,9 +290,6 @@ def _refused(source: Source, text: str, kind: type[Rejected] = Rejected) -> Reje
 def unusable(text: str) -> Rejected:
     """A recording that this class cannot be given."""
     return Rejected(Diagnostic("DRIVE104", text))
-
-
-# -- messages ------------------------------------------------------------------------------------------------
 
 
 def _messages(node: Node, package: Path, known: Definitions, kind: Driving, distro: str | None) -> dict[str, Any]:
