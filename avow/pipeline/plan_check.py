@@ -20,6 +20,7 @@ from avow.language.load import check_paths
 from avow.pipeline.methods import method_backend, method_job
 from avow.pipeline.work import ENGINES
 from avow.system import launched
+from avow.system.driven import misused
 from avow.system.faults import rest_of
 from avow.system.graph import dataflow
 from avow.system.node_plan import never_read
@@ -58,6 +59,7 @@ def of_plan(
         *left_out(system),
         *excluded(system),
         *never_read(system.plan),
+        *misused(system.plan),
     ]
     for plan in system.plan.nodes:
         for method in plan.methods:

@@ -115,15 +115,18 @@ def _started_with(launched: Started) -> tuple[dict[str, tuple[Any, Span]], tuple
             there |= {name: (value, setting.span) for name, value in _set(setting, launched.name)}
         except (OSError, ValueError, yaml.YAMLError, WrongParameters) as error:
             what = setting.name or os.path.normpath(setting.value or "a file")
+            why, near = str(error), None
             if isinstance(error, yaml.MarkedYAMLError) and error.problem_mark:
-                error = ValueError(f"line {error.problem_mark.line + 1}: {error.problem}")
-            message = f"{launched.name} is started with the parameters of {what}, which are not read: {error}"
+                why = f"line {error.problem_mark.line + 1}: {error.problem}"
+            elif isinstance(error, OSError):
+                why, near = error.strerror or why, nearby(Path(setting.value))
+            message = f"{launched.name} is started with the parameters of {what}, which are not read: {why}"
             if setting.name:
-                message = f"{launched.name} is started with the parameter {what}, which is not read: {error}"
+                message = f"{launched.name} is started with the parameter {what}, which is not read: {why}"
                 there.pop(what, None)
             else:
                 there.clear()  # it may set any of them
-            hint = "see to it yourself that the plan's `source: {parameters: …}` has the same"
+            hint = near or "see to it yourself that the plan's `source: {parameters: …}` has the same"
             unread.append(Diagnostic("ROS121", message, setting.span, Severity.WARNING, hint))
     return there, tuple(unread)
 
@@ -170,7 +173,7 @@ def told(system: System) -> Iterator[Diagnostic]:
                 yield from _started_with(one)[1]  # else the same file may be reported for its own faults
         elif not node.relay and node.name not in (*model.get("compound", {}), *model.get("external", {})):
             message = f"no launch file starts {node.name}"
-            names = [s.name for s in launched.nodes if s.name]
+            names = list(dict.fromkeys(s.name for s in launched.nodes if s.name))
             hint = suggest(f"/{node.name}", names) or "name it under `ros: {nodes: …}`, or as `external` under `model`"
             yield Diagnostic("ROS124", message, node.span, Severity.WARNING, hint)
     for one in launched.nodes:

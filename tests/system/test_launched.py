@@ -249,7 +249,8 @@ def test_parameters_of_a_launch_file_are_compared(tmp_path: Path, own: str, laun
     plan = "nodes: {b: {source: {python: b.py, class: B, kind: rclpy, parameters: p.yaml}, methods: []}}\n"
     if launched.startswith("Node"):
         here = "PathJoinSubstitution([ThisLaunchFileDir(), 'p.yaml'])"
-        text = f"def generate_launch_description():\n    return LaunchDescription([{launched.replace('HERE', here)}])\n"
+        text = "from launch import *\n\n\ndef generate_launch_description():\n"
+        text += f"    return LaunchDescription([{launched.replace('HERE', here)}])\n"
         folder = make(tmp_path, f"{plan}ros: {{launch: [../../launch/robot.launch.py]}}")
         (tmp_path / "launch/robot.launch.py").write_text(text, encoding="utf-8")
     else:
@@ -286,3 +287,18 @@ def test_memory_needs_no_topic(tmp_path: Path) -> None:
         assert found == told_
         shown = CliRunner().invoke(check, [str(folder)]).output
         assert ("no topic of `b` carries `in.y`" in shown) is bool(told_)
+
+
+def test_a_launch_file_in_python_that_lacks_an_import(tmp_path: Path) -> None:
+    text = "def generate_launch_description():\n    return LaunchDescription([Node(name=nam, package=os.sep)])\n"
+    folder = make(tmp_path, "ros: {launch: [../../launch/robot.launch.py]}")
+    (tmp_path / "launch/robot.launch.py").write_text(f"name = 'a'\n{text}", encoding="utf-8")
+    with pytest.raises(Rejected) as caught:
+        load_system(folder)
+    found = [(d.code, d.span.line, d.span.column, d.hint) for d in caught.value.diagnostics if d.span]
+    assert found == [
+        ("ROS120", 3, 12, "write `from launch import LaunchDescription`"),
+        ("ROS120", 3, 31, "write `from launch_ros.actions import Node`"),
+        ("ROS120", 3, 41, "did you mean `name`?"),
+        ("ROS120", 3, 54, "write `import os`"),
+    ]

@@ -10,8 +10,10 @@ import ast
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import field
+from pathlib import Path
 
-from avow.base.diagnostics import Span
+from avow.base.diagnostics import Diagnostic, Span
+from avow.base.python_names import unbound
 from avow.base.records import dataclass
 from avow.base.tuning.sizes import LAUNCH_ELEMENTS
 from avow.ros.launch.elements import VARIABLE, Element, Parsed, Text, Unread, WrongLaunch, joined, literal, unread
@@ -66,6 +68,20 @@ _MADE: Mapping[str, tuple[str, Mapping[str, str]]] = {
 actions; empty: it is not read."""
 
 
+_MODULES = {
+    "launch": ("LaunchDescription",),
+    "launch.actions": ("DeclareLaunchArgument", "GroupAction", "IncludeLaunchDescription", "LogInfo", "TimerAction"),
+    "launch.conditions": ("IfCondition", "UnlessCondition"),
+    "launch.launch_description_sources": ("PythonLaunchDescriptionSource",),
+    "launch.substitutions": ("LaunchConfiguration", "PathJoinSubstitution", "TextSubstitution", "Command"),
+    "launch_ros.actions": (*sorted(_ACTIONS - {"ComposableNode", "IncludeLaunchDescription", "GroupAction"}),),
+    "launch_ros.descriptions": ("ComposableNode", "ParameterValue"),
+    "launch_ros.substitutions": ("FindPackageShare",),
+    "ament_index_python.packages": ("get_package_share_directory",),
+}
+"""Module → the names that launch files often import from it."""
+
+
 def from_python(text: str, file: str) -> Parsed:
     """Raises WrongLaunch."""
     try:
@@ -110,6 +126,13 @@ class _Python:
                 self.tell(node, "what is returned under a condition is not read")
             elif isinstance(node, ast.Call) and _called(node) in _ACTIONS:
                 self.tell(node, f"this {_called(node)}(…) is not read: it is not written out in the list of actions")
+        for name, hint in unbound(self.module):
+            known = (
+                f"write `from {module} import {name.id}`" for module, names in _MODULES.items() if name.id in names
+            )
+            hint = next(known, hint)
+            text = f"{Path(self.file).name}: `{name.id}` is not defined: the file neither imports nor assigns it"
+            self.found.unread.append(Diagnostic("ROS120", text, self.at(name), hint=hint))
         return self.found
 
     def statement(self, statement: ast.stmt, counts: Mapping[str, int]) -> None:
@@ -368,8 +391,7 @@ class _Python:
             raise WrongLaunch("it says more than can be read", getattr(node, "lineno", 1))
 
     def at(self, node: ast.expr | ast.stmt) -> Span:
-        line, column = getattr(node, "lineno", 1), getattr(node, "col_offset", 0) + 1
-        return Span(self.file, line, column, line, column + 1)
+        return Span(self.file, node.lineno, node.col_offset + 1, node.end_lineno or 0, (node.end_col_offset or 0) + 1)
 
     def tell(self, node: ast.expr | ast.stmt, message: str) -> None:
         self.seen.add(id(node))

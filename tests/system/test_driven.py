@@ -1,0 +1,93 @@
+"""What `avow check` says of a callback class from its text: certain faults alone."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from helpers import avow
+
+CONTRACT = """
+node a { inputs( x : REAL ) outputs( y : REAL )
+  topics( std_msgs/Float64 /x matches(in.x), std_msgs/Float64 /y matches(out.y) ) guarantee g ( out.y == in.x ) }
+"""
+SOURCE = """\
+import math, threading
+import rclpy, rospy
+from rclpy.node import Node
+
+
+class A(Node):
+    def __init__(self):
+        super().__init__("a")
+        REGISTERED
+
+    METHOD
+"""
+
+
+def told(folder: Path, registered: str, method: str, kind: str = "rclpy") -> list[tuple[str, str]]:
+    """The codes and hints about the class."""
+    (folder / "system.rcl").write_text(CONTRACT, "utf-8")
+    text = SOURCE.replace("REGISTERED", registered).replace("METHOD", method)
+    (folder / "a.py").write_text(text, "utf-8")
+    source = f"nodes: {{a: {{source: {{python: a.py, class: A, kind: {kind}}}, methods: []}}}}\n"
+    (folder / "plan.yaml").write_text(source, "utf-8")
+    printed = avow("check", str(folder), cwd=folder).stdout
+    blocks = [block for block in printed.split("\n\n") if "[DRIVE" in block]
+    assert all("a.py:" in block for block in blocks)
+    return [(block.partition("[")[2][:8], block.partition("help: ")[2].partition("\n")[0]) for block in blocks]
+
+
+HEAR, TICK = "self.create_subscription(int, '/x', self.heard, 10)", "self.create_timer(1.0, callback=self.tick)"
+SERVE = "self.create_service(int, '/s', self.serve)"
+
+
+@pytest.mark.parametrize(
+    ("registered", "method", "hint"),
+    [
+        (HEAR, "def heard(message): pass", "write `def heard(self, message)`"),
+        (HEAR, "def heard(self): pass", "write `def heard(self, message)`"),
+        (HEAR, "async def heard(self, a, b, c): pass", "write `def heard(self, message)`"),
+        (HEAR, "def heard(self, message, *, extra): pass", "write `def heard(self, message)`"),
+        (TICK, "def tick(): pass", "write `def tick(self)`"),
+        (TICK, "def tick(self, event): pass", "write `def tick(self)`"),
+        (SERVE, "def serve(self, r): pass", "write `def serve(self, request, response)`"),
+        ("rospy.Subscriber('/x', int, self.heard)", "def heard(): pass", "write `def heard(self, message)`"),
+        ("rospy.Timer(1, self.tick)", "def tick(self): pass", "write `def tick(self, event)`"),
+    ],
+)  # fmt: skip
+def test_a_callback_that_does_not_take_what_it_is_called_with(
+    registered: str, method: str, hint: str, tmp_path: Path
+) -> None:
+    assert told(tmp_path, registered, method) == [("DRIVE105", hint)]
+
+
+@pytest.mark.parametrize(
+    ("registered", "method"),
+    [
+        (HEAR, "def heard(self, message, info=None): pass"),
+        (HEAR, "def heard(self, *given): pass"),
+        (HEAR, "@staticmethod\n    def heard(message): pass"),
+        (HEAR, "def other(self): pass"),
+        ("self.create_subscription(int, '/x', lambda m: m, 10)", "def heard(self): pass"),
+        ("self.heard = print; self.create_subscription(int, '/x', self.heard, 10)", "def heard(): pass"),
+        ("threading.Timer(1.0, self.tick)", "def tick(self): pass"),
+        ("rospy.Timer(1, self.tick)", "def tick(self, event): print(math.pi)"),
+        ("rospy.Subscriber('/x', int, self.heard, 3)", "def heard(self, message, three): pass"),
+        ("print([each for each in (lambda z: z)(())])", "def f(self, *a, **b):\n        global g; print(a, b, g)"),
+        ("print(__file__, __name__)", "def f(self):\n        try: pass\n        except OSError as e: print(e)"),
+    ],
+)  # fmt: skip
+def test_what_may_be_right_is_not_told(registered: str, method: str, tmp_path: Path) -> None:
+    assert told(tmp_path, registered, method) == []
+
+
+def test_a_name_that_nothing_defines(tmp_path: Path) -> None:
+    found = told(tmp_path, "print(os.sep, rclpi)", "def f(self): return unknown")
+    assert found == [
+        ("DRIVE106", "write `import os`"),
+        ("DRIVE106", "did you mean `rclpy`?"),
+        ("DRIVE106", "import it, or define it in this file"),
+    ]
+    assert told(tmp_path, "from os import *; print(sep)", "pass") == []
