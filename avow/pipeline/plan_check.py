@@ -19,7 +19,7 @@ from avow.calculus.scenario import excluded
 from avow.language.load import check_paths
 from avow.pipeline.methods import method_backend, method_job
 from avow.pipeline.work import ENGINES
-from avow.system import launched
+from avow.system import code_ends, launched
 from avow.system.driven import misused
 from avow.system.faults import rest_of
 from avow.system.graph import dataflow
@@ -50,6 +50,7 @@ def of_plan(
         *launched.told(system),
         *unknown_types(system.plan, system.contract),
         *turned(system.plan, system.contract),
+        *code_ends.checked(system),
         *_model(system),
         *_policy(system),
         *requirement_sentences(system),

@@ -104,12 +104,12 @@ class Shortcut:
 
 
 def _reads_elsewhere(workspace: Workspace) -> bool:
-    """Whether a plan may read files outside ``contracts/``: it contains `launch` outside comments, or an escape that
-    may spell it. Raises OSError."""
+    """Whether a plan may read files outside ``contracts/``: it contains `launch`, `code` or `qos` outside comments, or
+    an escape that may spell it. Raises OSError."""
     plans = (read_regular(path) for path in workspace.contracts.rglob("plan.yaml"))
     lines = [line.lstrip() for plan in plans for line in plan.splitlines()]
     said = (line for line in lines if not (line.startswith(b"#") and line.isascii()))  # YAML has more line ends
-    return any(b"launch" in line or b"\\" in line for line in said)
+    return any(word in line for line in said for word in (b"launch", b"code:", b"qos", b"\\"))
 
 
 def _stamp(workspace: Workspace) -> Path:

@@ -86,6 +86,8 @@ def compose_slice(system: System) -> ComposeSlice:
         statements=(),
         launched=None,
         included=(),
+        ends=(),
+        records=(),
     )
     return ComposeSlice(System(plan, replace(system.contract, files=())))
 

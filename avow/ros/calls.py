@@ -46,7 +46,7 @@ def named(topic: str) -> str:
 def with_calls(listing: Listing) -> Listing:
     """A graph with the parts of its services' and actions' calls as topics, as far as their types are given; without
     the topics that implement an action."""
-    types = {t: kind for t, kind in listing.types.items() if kind.partition("/")[0] not in _OWN_CALLS}
+    types = {t: kind for t, kind in listing.types.items() if kind.partition("/")[0] not in OWN_CALLS}
     raw = {topic for topic, kind in types.items() if parts_of(topic, kind)}
     parts: dict[str, str] = {}
 
@@ -83,7 +83,7 @@ def _once(names: Iterable[str]) -> tuple[str, ...]:
 
 _SERVICE = (("Request",), ("Response",))
 _ACTION = (("Goal",), ("Result", "Feedback"))
-_OWN_CALLS = ("rcl_interfaces", "type_description_interfaces", "lifecycle_msgs", "roscpp", "nodelet")
+OWN_CALLS = ("rcl_interfaces", "type_description_interfaces", "lifecycle_msgs", "roscpp", "nodelet")
 """Packages of the services that every ROS node, or every lifecycle node, has."""
 
 

@@ -23,37 +23,47 @@ from avow.language.contract import Contract, Node
 from avow.ros.launch import Launched, Setting, Started, read_launch
 from avow.ros.names import Placed, Resolver
 from avow.ros.parameters import WrongParameters, flat, is_sectioned, of_node
+from avow.ros.quality import BAG_FILE
 from avow.system.node_plan import parameter_place, parameters
 from avow.system.plan import Plan, System
 from avow.system.strict_yaml import Piece
 
 
 def read_launched(plan: Path, pieces: Iterable[Piece]) -> tuple[Launched | None, tuple[Diagnostic, ...]]:
-    """What the plan's launch files start; None if it names none. They are in the workspace, or in the system's folder
-    if that is in no workspace."""
-    folder = plan.resolve().parent
-    place = find_workspace(folder)
-    root = place.root if place is not None else folder
+    """What the plan's launch files start; None if it names none."""
     faults: list[Diagnostic] = []
     files: list[tuple[Path, dict[str, str]]] = []
     for piece in pieces:
-        named = piece.at("file") or piece
-        path = inside(root, f"{folder.relative_to(root).as_posix()}/{named.text}")
-        if path is None or Path(named.text).is_absolute():
-            message = f"the path {named.text[:200]!r} leads out of the workspace"
-            faults.append(Diagnostic("PLAN108", message, named.span))
-        elif not path.is_file():
-            message = f"there is no file {named.text!r} in {folder}"
-            faults.append(Diagnostic("PLAN107", message, named.span, hint=nearby(path)))
-        else:
+        if (path := in_workspace(plan, piece.at("file") or piece, faults)) is not None:
             given = piece.at("args")
             entries = (given.entries or {}) if given is not None else {}
             files.append((path, {name: _value(value) for name, value in entries.items()}))
     if not files and not faults:
         return None, ()
-    found = read_launch(files, root)
+    found = read_launch(files, _root(plan))
     found = replace(found, unread=(*faults, *found.unread))
     return found, tuple(d for d in found.unread if d.is_error)
+
+
+def in_workspace(plan: Path, piece: Piece, faults: list[Diagnostic]) -> Path | None:
+    """A file or a bag's folder that the plan names: it is in the workspace, or in the system's folder if that is in no
+    workspace. Otherwise None, and a fault."""
+    folder, root = plan.resolve().parent, _root(plan)
+    path = inside(root, f"{folder.relative_to(root).as_posix()}/{piece.text}")
+    if path is None or Path(piece.text).is_absolute():
+        faults.append(Diagnostic("PLAN108", f"the path {piece.text[:200]!r} leads out of the workspace", piece.span))
+    elif path.is_file() or (path / BAG_FILE).is_file():
+        return path
+    else:
+        message = f"there is no file {piece.text!r} in {folder}"
+        faults.append(Diagnostic("PLAN107", message, piece.span, hint=nearby(path)))
+    return None
+
+
+def _root(plan: Path) -> Path:
+    folder = plan.resolve().parent
+    place = find_workspace(folder)
+    return place.root if place is not None else folder
 
 
 def _value(piece: Piece) -> str:
@@ -100,9 +110,9 @@ def _parameters(plan: Plan, node: Node, launched: Started) -> Iterator[Diagnosti
             alone = [other for other in alone if other not in meant]
             hint = "write what the robot is started with into the file that the plan names:  source: {parameters: …}"
             hint = f"the plan has `{meant[0]}`: correct the one that is wrong" if meant else hint
-            yield Diagnostic("ROS127", message, place(name), hint=hint, notes=((_at(span), span),))
+            yield Diagnostic("ROS127", message, place(name), hint=hint, notes=((where(span), span),))
     for name in alone:
-        message = f"the plan sets {name} of {node.name}, and {_at(launched.span)} starts it without"
+        message = f"the plan sets {name} of {node.name}, and {where(launched.span)} starts it without"
         yield Diagnostic("ROS127", message, place(name), hint="leave it out, or launch with it")
 
 
@@ -211,7 +221,7 @@ def _launched(plan: Plan, node: Node, mine: Placed, faults: list[Diagnostic]) ->
     else:
         found = [s for s in every if s.name.rpartition("/")[2] == node.name]
     if len({(s.name, s.remaps) for s in found}) > 1:
-        shown = "; ".join(f"{s.name} at {_at(s.span)}" for s in found)
+        shown = "; ".join(f"{s.name} at {where(s.span)}" for s in found)
         message = f"which of the started nodes {node.name} is, is not said: {shown}"
         notes = tuple((f"{s.name} is started here", s.span) for s in found)
         faults.append(Diagnostic("ROS123", message, mine.span or node.span, hint=_NAME_IT, notes=notes))
@@ -235,7 +245,7 @@ def _doubted(plan: Plan, node: Node, mine: Placed, launched: Started | None) -> 
     unread = [d for d in plan.launched.unread if not d.is_error]
     doubts, span = (launched.unread, launched.span) if launched is not None else ((), None)
     if launched is None and unread:
-        place = f" at {_at(unread[0].span)}" if unread[0].span else ""
+        place = f" at {where(unread[0].span)}" if unread[0].span else ""
         doubts, span = (f"nothing that is read starts it, and not all is read{place}: {unread[0].message}",), node.span
     if doubts:
         message = f"how {node.name}'s topics are called when it runs is not known: {'; '.join(doubts)}"
@@ -253,11 +263,11 @@ def _disagreements(node: Node, mine: Placed, launched: Started) -> Iterator[Diag
         if here.resolved(old) != there.resolved(old):
             message = (
                 f"ros.nodes.{node.name}.remap: {old} is {here.resolved(old)} by the plan, and {there.resolved(old)} "
-                f"by {_at(launched.span)}"
+                f"by {where(launched.span)}"
             )
             notes = ((f"{launched.name} is started here", launched.span),)
             yield Diagnostic("ROS122", message, mine.span, notes=notes)
 
 
-def _at(span: Span | None) -> str:
+def where(span: Span | None) -> str:
     return f"{Path(span.file).name}:{span.line}" if span is not None else "a launch file"

@@ -21,6 +21,7 @@ from avow.language.contract import Contract, Port
 from avow.language.lints import uncarried, unspoken
 from avow.ros.launch import Launched
 from avow.ros.names import Resolver
+from avow.ros.quality import Quality
 
 
 @dataclass(frozen=True, slots=True)
@@ -394,6 +395,16 @@ class Ros:
 
 
 @dataclass(frozen=True, slots=True)
+class NodeEnds:
+    """What the plan says of a node's publishers and subscribers: `files` whose code creates them, and the quality of
+    service of topics (as the node names them) that no code tells."""
+
+    node: str
+    files: tuple[Path, ...] = ()
+    qualities: tuple[tuple[str, Quality, Span], ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
 class Plan:
     """A whole plan.yaml, checked against its schema and against the contract's names."""
 
@@ -426,6 +437,9 @@ class Plan:
     """Files of hazards, launch files, and files of other systems that are included as subsystems: this plan depends on
     them too."""
     hazards: tuple[Hazard, ...] = ()
+    ends: tuple[NodeEnds, ...] = field(default=(), metadata=codec.LATER)
+    records: tuple[Path, ...] = field(default=(), metadata=codec.LATER)
+    """Files that record quality of service."""
 
     @property
     def root(self) -> Path:

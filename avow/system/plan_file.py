@@ -16,8 +16,9 @@ from avow.base.files import inside, read_regular, sha256
 from avow.base.remembered import Shelf
 from avow.base.suggestions import nearby
 from avow.ros.names import Placed, Resolver
+from avow.ros.quality import BAG_FILE, quality, seconds
 from avow.system.hazards import read_hazards
-from avow.system.launched import read_launched
+from avow.system.launched import in_workspace, read_launched
 from avow.system.node_plan import files_of, read_methods, read_source
 from avow.system.plan import (
     ComposeGoal,
@@ -26,6 +27,7 @@ from avow.system.plan import (
     EnvironmentInput,
     Finding,
     Located,
+    NodeEnds,
     NodePlan,
     Picture,
     Plan,
@@ -119,6 +121,11 @@ class _PlanReader:
         self.model_graph()
         scenario = self.scenario()
         launched = self.noted(read_launched(self.path, self.root.each("ros", "launch")))
+        ends = tuple(self.ends())
+        records = self.elsewhere(self.root.each("ros", "qos"))
+        looked_at = [
+            path / BAG_FILE if path.is_dir() else path for path in (*records, *(f for e in ends for f in e.files))
+        ]
         hazard_files = [path for piece, path in self.paths("hazards") if self.present(piece, path)]
         return Plan(
             system=name,
@@ -144,8 +151,25 @@ class _PlanReader:
             statements=self.noted(read_statements(self.root)),
             ros=_ros(self.root),
             launched=launched,
-            included=(*hazard_files, *(launched.files if launched is not None else ())),
+            included=(*hazard_files, *(launched.files if launched is not None else ()), *looked_at),
+            ends=ends,
+            records=records,
         )
+
+    def elsewhere(self, pieces: list[Piece]) -> tuple[Path, ...]:
+        """Files of the workspace."""
+        found = (in_workspace(self.path, piece, self.faults) for piece in pieces)
+        return tuple(path for path in found if path is not None)
+
+    def ends(self) -> Iterator[NodeEnds]:
+        for node, _, piece in self.root.keyed("ros", "nodes"):
+            said = [(topic, given, entry.data) for topic, given, entry in piece.keyed("qos")]
+            times = ("deadline", "lease")
+            made = ((t, {k: seconds(v) if k in times else v for k, v in data.items()}, at) for t, at, data in said)
+            qualities = tuple((topic, quality(data), at) for topic, data, at in made)
+            files = self.elsewhere(piece.each("code"))
+            if files or qualities:
+                yield NodeEnds(node, files, qualities)
 
     def noted(self, read: tuple[T, Sequence[Diagnostic]]) -> T:
         """The plan as read; its faults are noted."""

@@ -272,7 +272,7 @@ def test_every_key_is_read_and_described() -> None:
     pages = "".join((root / "docs" / name).read_text("utf-8") for name in ("plan.md", "policy.md"))
     code = "".join(
         p.read_text("utf-8")
-        for room in ("system", "assurance", "backend_kit")
+        for room in ("system", "assurance", "backend_kit", "ros")
         for p in (root / "avow" / room).glob("*.py")
     )
     found = set(keys_of(plan_schema()))
