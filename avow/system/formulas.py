@@ -82,7 +82,9 @@ def environment_assumptions(system: System, graph: Graph) -> tuple[Assumed, ...]
         about = holders(system, graph, entry)
         outside = [e for e in about if e in graph.environment]
         if not outside:
-            providers = [str(graph.by_target[e].source) for e in about if e in graph.by_target]
+            edges = [graph.by_target[e] for e in about if e in graph.by_target]
+            heard = [graph.feeding(e.source.node) if e.source.node in graph.relays else (e,) for e in edges]
+            providers = [str(each.source) for some in heard for each in some]
             what = f"{', '.join(providers)} provides it" if providers else "all that read it are named apart"
             message = f"environment: {entry.port} is no environment input: {what}"
             faults.append(Diagnostic("PLAN113", message, entry.span))
