@@ -100,12 +100,16 @@ def settle(
             left = _unproved(again) or tuple(_lacking(again.members or (), scanned, generated, environment))
             unproved |= dict.fromkeys(spared, left)
     about_nothing: frozenset[str] = frozenset()
+    unasked: frozenset[str] = frozenset()
     if environment != "true" and generated.conditions and not all(unproved.values()):
         answer = verify(_asked_of_env(files, generated), limits, outside)
         logs["excluded.log"] = answer.output
-        about_nothing = _about_nothing(answer, generated)
+        unasked, about_nothing = _about_nothing(answer, generated)
     tried = [dict(c) for c in candidates(run.model, node)] if any(unproved.values()) else []
     verdicts = {name: _verdict(unproved[name], taken, environment, scanned, generated, tried) for name in guarantees}
+    for name in unasked & {n for n, settled in verdicts.items() if settled.verdict is Verdict.PROVED}:
+        text = f"proved, but Dafny does not answer whether Env ({environment}) excludes its condition"
+        verdicts[name] = replace(verdicts[name], verdict=Verdict.UNKNOWN, summary=text)
     for name in about_nothing & {n for n, settled in verdicts.items() if settled.verdict is Verdict.PROVED}:
         text = f"vacuous: where Env holds ({environment}), what it is about never comes about"
         verdicts[name] = replace(verdicts[name], summary=text, vacuous=True)
@@ -266,11 +270,18 @@ def _asked_of_env(files: Mapping[str, str], generated: Generated) -> dict[str, s
     return {**files, generated.contract_file: whole, EXCLUDED_FILE: generated.excluded}
 
 
-def _about_nothing(run: Run, generated: Generated) -> frozenset[str]:
-    """The guarantees for which Dafny proves that Env excludes a condition that the contract alone does not exclude."""
-    proved = {m.name for m in run.members or () if m.kind == "Impl" and m.outcome == "correct"}
-    asked = enumerate(generated.conditions)
-    return frozenset(name for k, name in asked if f"{BY_ENV}{k}" in proved and f"{ANYWAY}{k}" not in proved)
+def _about_nothing(run: Run, generated: Generated) -> tuple[frozenset[str], frozenset[str]]:
+    """The guarantees for whose conditions there is no answer, and those for which Dafny proves that Env excludes a
+    condition that the contract alone does not exclude."""
+    outcomes = {m.name: m.outcome for m in run.members or () if m.kind == "Impl"}
+    answers = [
+        (name, outcomes.get(f"{BY_ENV}{k}"), outcomes.get(f"{ANYWAY}{k}"))
+        for k, name in enumerate(generated.conditions)
+    ]
+    return (
+        frozenset(name for name, by_env, anyway in answers if by_env is None or anyway is None),
+        frozenset(name for name, by_env, anyway in answers if by_env == "correct" and anyway not in (None, "correct")),
+    )
 
 
 def _name(file: str, generated: Generated, shown_name: str) -> str:

@@ -193,7 +193,7 @@ def _excluded(
     for clause, _ in promised:
         for situation in triggers(clause.formula):
             try:
-                found = print_clause(f"{clause.name} condition", situation, words)
+                found = print_clause(f"{clause.name} condition {len(whose)}", situation, words)
             except NotExpressible:
                 continue
             for predicate in found:

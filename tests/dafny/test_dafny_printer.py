@@ -14,9 +14,10 @@ import pytest
 from avow.backend_kit.protocol import Job, Limits
 from avow.backends.dafny import BACKEND
 from avow.backends.dafny.dafny_tool import dafny
+from avow.backends.dafny.judge import _about_nothing
 from avow.backends.dafny.modules import Generated, generate
 from avow.backends.dafny.printer import RESERVED, Names, NotExpressible, Vocabulary, identifier, print_clause
-from avow.backends.dafny.runner import verify
+from avow.backends.dafny.runner import Run, verify
 from avow.base.verdict import Verdict
 from avow.isolation.outside import Outside
 from avow.language import terms as t
@@ -34,6 +35,18 @@ REFRESH = "AVOW_REFRESH"
 
 def everything(node: Node) -> Generated:
     return generate(node, [c.name for c in node.guarantees])
+
+
+def test_each_situation_has_a_name_of_its_own_and_no_answer_is_no_good_answer() -> None:
+    """A guarantee with two situations, each with a quantifier; a question that Dafny rejects answers nothing."""
+    text = """node n { inputs( s : <INTEGER>, x : INTEGER ) outputs( b : BOOL ) topics()
+    guarantee e ( out.b <=> exists(j in INTEGER | j in in.s and j == in.x) ) }"""
+    made = everything(check_text(text, "n.rcl")[0].node("n"))
+    assert made.conditions.count("e") > 1
+    named = re.findall(r"predicate (?:method )?(\w+)", made.situations)
+    assert len(named) == len(set(named)) > 1
+    rejected = Run((), 2, (), (), None, "duplicate", "", None)
+    assert _about_nothing(rejected, made) == ({"e"}, frozenset())
 
 
 @pytest.mark.parametrize(
