@@ -238,7 +238,7 @@ def _about_node(node: Node) -> Iterator[Diagnostic]:
         first = carriers.setdefault((topic.port.role, topic.port.name), topic.name)
         if first != topic.name:
             message = f"two topics carry `{topic.port.role}.{topic.port.name}`: `{first}` and `{topic.name}`"
-            yield _warning("RCL411", message, topic.span, "monitors read it from the first, unless the plan says which")
+            yield _warning("RCL411", message, topic.span, "a monitor needs a `mapping` that says which it reads")
     for clause in node.assumptions:
         if clause.formula != t.TRUE and _always(clause.formula):
             message = f"the assumption `{clause.name}` says nothing: the types of the inputs make it true"

@@ -10,6 +10,7 @@ from typing import Any
 
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.files import inside
+from avow.base.plain import listed
 from avow.base.suggestions import nearest, suggest
 from avow.evaluation.evaluate import NotEvaluable, evaluate
 from avow.formulas.formula import free_variables
@@ -379,6 +380,9 @@ class _Work:
             topic = resolved(self.system, self.node, entry["topic"]) if "topic" in entry else topic
         if topic is None:
             return f"no topic of {self.node.name} matches {name}, and the plan does not map it"
+        carriers = sorted({of.name for of in self.node.topics if of.port == port})
+        if len(carriers) > 1 and not (isinstance(entry, Mapping) and "topic" in entry):
+            return f"{listed(carriers)} carry {name}, and a monitor reads one: `mapping` says which"
         for several, who in self.system.plan.ros.shared:
             if port.role is Role.OUTPUT and same_topic(topic) == same_topic(several):
                 self.shared[name] = self.system.plan.ros.names.placed(self.node.name).name, who

@@ -360,3 +360,19 @@ def test_what_a_node_is_told_is_no_answer_of_it(
     found = [fault for fault in faults if "it is read from the message that gives" in fault.message]
     assert [fault.message.partition("gives ")[2] for fault in found] == ([told] if told else []), faults
     assert all(fault.span is not None for fault in found)
+
+
+def test_a_variable_on_two_topics_is_read_from_neither_unless_the_plan_names_one(
+    make_system: Callable[..., System],
+) -> None:
+    rcl = """node n { inputs( v : REAL ) outputs( w : REAL )
+      topics( float64 a matches(in.v), float64 b matches(in.v), float64 w matches(out.w) )
+      guarantee g ( out.w == in.v ) }"""
+    events = [{"topic": "a", "data": 1.0}, {"topic": "b", "data": 2.0}, {"topic": "w", "data": 2.0}]
+    unsaid = monitor_of(make_system(rcl))
+    assert [v for e in events for v in unsaid.step(e)] == []
+    assert unsaid.tallies["g"].judged == 0
+    assert "in.v" not in unsaid.setup.carried
+    named = monitor_of(make_system(rcl, {"in.v": {"topic": "b"}}))
+    assert [v for e in events for v in named.step(e)] == []
+    assert (named.tallies["g"].judged, named.tallies["g"].broken) == (1, 0)
