@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from . import program
 from .program import Expr, Kind, Scalar, parts
-from .whole_file import Parts, Refusal
+from .whole_file import Parts, Refusal, outside
 
 if TYPE_CHECKING:
     from .translate import Scope
@@ -67,6 +67,13 @@ class Expressions:
             self.conditional -= 1
 
     def expression(self, node: ast.expr) -> Expr:
+        try:
+            return self._expression(node)
+        except Refusal as refusal:
+            refusal.within(node)
+            raise
+
+    def _expression(self, node: ast.expr) -> Expr:
         constant = self.constant(node)
         if isinstance(constant, bool | int | float | str):
             return _const(constant, node.lineno)
@@ -109,7 +116,7 @@ class Expressions:
                 raise Refusal(
                     line, f"{ast.unparse(node)} is not in the subset: an enumeration's elements are texts here"
                 )
-        raise Refusal(line, f"{type(node).__name__} is not in the subset here")
+        raise outside(node, line)
 
     # -- names -------------------------------------------------------------------------------------------
 
@@ -204,7 +211,7 @@ class Expressions:
     def arithmetic(self, left: ast.expr, op: ast.operator, right: ast.expr, line: int) -> Expr:
         operator = _OPERATORS.get(type(op))
         if operator is None:
-            raise Refusal(line, f"the operator {type(op).__name__} is not in the subset")
+            raise outside(op, line)
         one, other = self.number(left), self.number(right)
         if operator in ("//", "%") and {one.kind, other.kind} != {Kind.INT}:
             raise Refusal(line, f"{operator} of a float is not in the subset")
@@ -235,7 +242,7 @@ class Expressions:
                     return among if isinstance(op, ast.In) else program.Unary("not", among, Kind.BOOL)
             operator = _COMPARED.get(type(op))
             if operator is None:
-                raise Refusal(line, f"the comparison {type(op).__name__} is not in the subset here")
+                raise outside(op, line)
             other = self.expression(node) if k == 0 else self.under_condition(node)
             if len(ops) > 1 and any(isinstance(p, program.Inlined) for p in parts(other)):
                 raise Refusal(line, "a call between two comparisons")
@@ -291,7 +298,8 @@ class Expressions:
                 self.is_object(receiver) and name in self.parts.methods
             ):
                 return self.inline(self.parts.methods[name], arguments, True, line)
-        raise Refusal(line, f"the call of {ast.unparse(func)[:60]} is not in the subset")
+        allowed = "call min, max, abs, len, float, an own method, or a function of this file"
+        raise Refusal(line, f"the call of {ast.unparse(func)[:60]} is not in the subset", allowed)
 
     def view(self, node: ast.expr) -> program.View | None:
         """An input sequence or a part of it; None where it is none. Raises Refusal."""

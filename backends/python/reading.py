@@ -6,7 +6,7 @@ import ast
 import io
 import tokenize
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -51,10 +51,19 @@ class Reading:
 
     def remarks(self) -> tuple[Diagnostic, ...]:
         """A warning for everything that is refused."""
-        return tuple(
-            Diagnostic("PYTHON200", r.why, Span(str(self.file), r.line, 1, r.line, 1), Severity.WARNING)
-            for r in self.refused
-        )
+        return tuple(self._remark(refusal) for refusal in self.refused)
+
+    def _remark(self, refusal: Refusal) -> Diagnostic:
+        """At the part, or at its line without the indentation."""
+        text = (self.text.splitlines()[refusal.line - 1 : refusal.line] or [""])[0].rstrip()
+        line, part = refusal.line, refusal.part
+        span = Span(str(self.file), line, len(text) - len(text.lstrip()) + 1, line, len(text) + 1)
+        if part is not None:
+            end = part.end_col_offset if part.end_lineno == line else None
+            span = replace(span, column=part.col_offset + 1, end_column=len(text) + 1 if end is None else end + 1)
+        hint = f"{refusal.instead}, or " if refusal.instead else "rewrite it (docs/backends/python.md), or "
+        hint += f"test the class: nodes: {{{self.job.node.name}: {{methods: [hypothesis]}}}}"
+        return Diagnostic("PYTHON200", refusal.why, span, Severity.WARNING, hint)
 
 
 def files(job: Job) -> tuple[Path, ...]:

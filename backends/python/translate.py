@@ -19,7 +19,7 @@ from . import program
 from .expressions import Expressions
 from .program import Expr, Kind, Scalar, assigned
 from .tuning import INLINED_DEPTH
-from .whole_file import Parts, Refusal, bound_names, plain_arguments
+from .whole_file import Parts, Refusal, bound_names, outside, plain_arguments
 
 
 def kind_of(sort: s.Sort) -> Kind | None:
@@ -236,6 +236,13 @@ class Translator(Expressions):
         return tuple(found), True
 
     def statement(self, statement: ast.stmt) -> tuple[list[program.Statement], bool]:
+        try:
+            return self._statement(statement)
+        except Refusal as refusal:
+            refusal.within(statement)
+            raise
+
+    def _statement(self, statement: ast.stmt) -> tuple[list[program.Statement], bool]:
         line = statement.lineno
         match statement:
             case ast.Pass() | ast.Expr(value=ast.Constant()):
@@ -259,9 +266,7 @@ class Translator(Expressions):
                 return [program.Leave("break", line)], False
             case ast.Continue():
                 return [program.Leave("continue", line)], False
-            case ast.Assert():
-                raise Refusal(line, "assert is not checked where Python runs with -O")
-        raise Refusal(line, f"{_word(statement)} is not in the subset")
+        raise outside(statement, line)
 
     def together(self, targets: Sequence[ast.expr], values: Sequence[ast.expr], line: int) -> list[program.Statement]:
         """``a, b = b, a``: every value is found before anything is bound, from left to right."""
@@ -441,9 +446,3 @@ def _loaded(target: ast.Name | ast.Attribute) -> ast.expr:
             return ast.copy_location(ast.Name(name, ast.Load()), target)
         case ast.Attribute(value=value, attr=attribute):
             return ast.copy_location(ast.Attribute(value, attribute, ast.Load()), target)
-
-
-def _word(statement: ast.stmt) -> str:
-    return {"While": "while", "Try": "try", "With": "with", "Raise": "raise", "For": "for … else"}.get(
-        type(statement).__name__, type(statement).__name__
-    )

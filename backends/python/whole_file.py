@@ -67,11 +67,18 @@ def binders(*roots: ast.AST) -> Iterator[tuple[str, int]]:
 
 
 class Refusal(Exception):  # noqa: N818 - it says what happened
-    """Something that this method does not understand; `line` is the file's."""
+    """Something that this method does not understand; `line` is the file's, `part` what it is about, if that is known
+    more closely."""
 
-    def __init__(self, line: int, why: str) -> None:
+    def __init__(self, line: int, why: str, instead: str = "") -> None:
         super().__init__(line, why)
-        self.line, self.why = line, why
+        self.line, self.why, self.instead = line, why, instead
+        self.part: ast.expr | ast.stmt | None = None
+
+    def within(self, part: ast.expr | ast.stmt) -> None:
+        """The refused thing is in this part of its line: the first call, for the innermost part, counts."""
+        if self.part is None and part.lineno == self.line:
+            self.part = part
 
     def __str__(self) -> str:
         return f"line {self.line}: {self.why}"
@@ -239,12 +246,14 @@ def _imports(tree: ast.Module, file: Path) -> Iterator[Refusal]:
             yield Refusal(part.lineno, "an import of everything, or under another name")
         for name in names:
             if name not in MODULES:
-                yield Refusal(part.lineno, f"the import of {name}: what it runs is not looked at")
+                hint = f"only {', '.join(MODULES)} may be imported"
+                yield Refusal(part.lineno, f"the import of {name}: what it runs is not looked at", hint)
             head = name.partition(".")[0]
             if any(p.name.partition(".")[0] == head for p in beside if p.is_dir() or p.suffix in _LIBRARIES):
                 yield Refusal(part.lineno, f"a file beside this one is called {head}, as the module is")
             if isinstance(part, ast.ImportFrom):
-                for taken in sorted({alias.name for alias in part.names} - MODULES.get(name, frozenset())):
+                known = MODULES.get(name, {alias.name for alias in part.names})
+                for taken in sorted({alias.name for alias in part.names} - known):
                     yield Refusal(part.lineno, f"{taken} of {name} is not known to leave other code as it is")
     yield from _used(tree)
 
@@ -360,6 +369,55 @@ def _written_elsewhere(tree: ast.Module, parts: Parts) -> Iterator[Refusal]:
             yield Refusal(part.lineno, f"{part.attr} of the class is hidden by an attribute")
 
 
+_CONSTRUCTS: Mapping[str, tuple[str, str]] = {
+    "ListComp": ("a list comprehension", "write a `for` loop"),
+    "SetComp": ("a set comprehension", "write a `for` loop"),
+    "DictComp": ("a dict comprehension", "write a `for` loop"),
+    "GeneratorExp": ("a generator expression", "write a `for` loop"),
+    "Lambda": ("a lambda", "write a function of the module"),
+    "List": ("a list as a value", "give each item a name of its own"),
+    "Tuple": ("a tuple as a value", "give each item a name of its own"),
+    "Set": ("a set as a value", "give each item a name of its own"),
+    "Dict": ("a dict as a value", "give each item a name of its own"),
+    "JoinedStr": ("an f-string", "write each text as a constant"),
+    "Constant": ("this constant", "write a number, a truth value or a text"),
+    "Pow": ("the operator **", "multiply"),
+    "While": ("while", "write `for … in range(…)`"),
+    "Try": ("try", "ask with `if` before the exception could be raised"),
+    "Raise": ("raise", "return outputs that the contract allows"),
+    "Assert": ("assert", "write an `if`: Python with -O does not check it"),
+    "With": ("with", ""),
+    "Match": ("match", "write `if` and `elif`"),
+    "For": ("for … else", "write the `else` part after the loop"),
+    "Expr": ("a statement without effect on the outputs", "remove it"),
+    "Subscript": ("an index or a part of what is no input sequence", ""),
+    "FunctionDef": ("a function within a function", "write a function of the module"),
+    "ClassDef": ("a class within a function", "write it at the top of the file"),
+    "Import": ("an import within a function", "write it at the top of the file"),
+    "ImportFrom": ("an import within a function", "write it at the top of the file"),
+    "NamedExpr": ("the operator :=", "assign in a line before"),
+    "AnnAssign": ("an annotation without a value", "remove it"),
+    "Is": ("the comparison `is`", "write `==`"),
+    "IsNot": ("the comparison `is not`", "write `!=`"),
+}
+"""A class of syntax → its name for people, and what to write instead."""
+_SCOPES = (
+    *(ast.FunctionDef, ast.Lambda, ast.ClassDef, ast.NamedExpr, ast.Import, ast.ImportFrom),
+    *(ast.ListComp, ast.SetComp, ast.DictComp, ast.GeneratorExp),
+)
+"""What binds names within a function otherwise than its statements do."""
+
+
+def outside(part: ast.AST, line: int) -> Refusal:
+    """The refusal of syntax that is not in the subset."""
+    kind = type(part).__name__
+    words, instead = _CONSTRUCTS.get(kind, (kind, ""))
+    refusal = Refusal(line, f"{words} is not in the subset", instead)
+    if isinstance(part, ast.expr | ast.stmt):
+        refusal.within(part)
+    return refusal
+
+
 def reachable(parts: Parts, start: str) -> set[str]:
     """The methods that a method comes to, itself among them."""
     found: set[str] = set()
@@ -384,8 +442,6 @@ def plain_arguments(function: ast.FunctionDef) -> list[str]:
 def bound_names(function: ast.FunctionDef) -> frozenset[str]:
     """The names that its body binds: local everywhere in it. Arguments that it leaves alone are not among them."""
     for part in ast.walk(function):
-        if isinstance(part, ast.FunctionDef | ast.Lambda | ast.ClassDef | ast.NamedExpr) and part is not function:
-            raise Refusal(part.lineno, "a function, class or name bound within an expression or function")
-        if isinstance(part, ast.Import | ast.ImportFrom | ast.comprehension):
-            raise Refusal(getattr(part, "lineno", function.lineno), "an import or comprehension within a function")
+        if isinstance(part, _SCOPES) and part is not function:
+            raise outside(part, part.lineno)
     return frozenset(name for name, _ in binders(*function.body))

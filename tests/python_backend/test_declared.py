@@ -59,11 +59,27 @@ def test_parameters_that_others_may_read_otherwise(text: str, words: str, tmp_pa
     assert any(d.is_error and words in d.message for d in found), found
 
 
-def test_a_refusal_has_its_line_and_reason(tmp_path: Path) -> None:
-    source = WATCHDOG.source.replace("        if beat:", "        while beat:")
+@pytest.mark.parametrize(
+    ("text", "shown", "why", "instead"),
+    [
+        ("        while beat:", "while beat:", "while is", "write `for"),
+        ("        if now ** 2 > 4:", "now ** 2", "the operator ** is", "multiply"),
+        ("        if sum([now]) > 4:", "sum([now])", "the call of sum is", "call min, max"),
+        ("        if [t for t in now]:", "[t for t in now]", "a list comprehension is", "write a `for` loop"),
+        ("        import numpy\n        if beat:", "import numpy", "the import of numpy", "only __future__, math"),
+        ("        exec('')\n        if beat:", "exec('')", "exec can change or read", "rewrite it"),
+    ],
+)
+def test_a_refusal_has_its_place_its_construct_and_what_to_write(
+    text: str, shown: str, why: str, instead: str, tmp_path: Path
+) -> None:
+    source = WATCHDOG.source.replace("        if beat:", text)
     (told,) = BACKEND.check(replace(WATCHDOG, source=source).job(tmp_path))
-    assert (told.code, told.span and told.span.line, told.is_error) == ("PYTHON200", 7, False)
-    assert "while is not in the subset" in told.message
+    assert (told.code, told.is_error) == ("PYTHON200", False)
+    assert told.span is not None
+    assert source.splitlines()[told.span.line - 1][told.span.column - 1 : told.span.end_column - 1] == shown
+    assert told.message.startswith(why)
+    assert (told.hint or "").startswith(instead)
 
 
 @pytest.mark.slow
