@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 from enum import StrEnum
-from functools import cache
+from functools import cache, lru_cache
 from typing import Any, NamedTuple
 
 from .environment import Choice, Environment
@@ -22,6 +22,7 @@ from .intentions import PERCEPTION, START, of_deed, of_event, post
 from .mind import NONE, Done, Mind, Table
 from .syntax import SENT, Deed, DeedKind, Event, Goal, GoalKind, Program, Sign
 from .terms import Struct, plain, unify
+from .tuning import RECENT
 
 
 class Semantics(StrEnum):
@@ -133,9 +134,10 @@ class Agent(Mind):
         self.cores: Table[State] = Table()
         self.queues: Table[tuple[int, ...]] = Table()
         self._percepts, self._direct = cache(self._perceptions), cache(self._changes)
-        self._perceived, self._planned = cache(self._perceive), cache(self._choose_plan)
+        recent = lru_cache(RECENT)
+        self._perceived, self._planned = recent(self._perceive), recent(self._choose_plan)
         self._woken = cache(self._after_change)
-        self._effects, self._outcomes, self._owned = cache(self._effect), cache(self._outcome), cache(self._own)
+        self._effects, self._outcomes, self._owned = recent(self._effect), recent(self._outcome), recent(self._own)
 
     # The state graph
 
@@ -204,8 +206,9 @@ class Agent(Mind):
             return (self.altered(number, drawn=False),)
         if now.planned:
             after, action = self.act(number)
-            queue = after & QUEUE
-            return tuple([core << BITS | queue for core in self._outcomes(after >> BITS, action)])
+            if action == NONE:
+                return (after,)
+            return tuple([core << BITS | after & QUEUE for core in self._outcomes(after >> BITS, action)])
         if now.asleep:
             return self._idle(number)
         if not now.begun:
@@ -265,10 +268,8 @@ class Agent(Mind):
         state = self._perceived(core, draw)[0]._replace(new=again)
         if current == NONE or asleep:
             return self.cores.number(state._replace(current=NONE, asleep=asleep))
-        if current == self.empty:
-            return self.cores.number(state._replace(current=current))
         chosen, goals = current, state.goals
-        if self.intentions.all[current].frames[-1].deeds is None:
+        if current != self.empty and self.intentions.all[current].frames[-1].deeds is None:
             chosen, goals = self.chosen(state.beliefs, goals, current)
         return self.cores.number(state._replace(current=chosen, goals=goals, planned=chosen != self.empty))
 
@@ -306,17 +307,15 @@ class Agent(Mind):
 
     def _outcome(self, core: int, action: int) -> tuple[int, ...]:
         """The possible cores after the agent has done the action."""
-        if action == NONE:
-            return (core,)
-        state, name = self.cores.all[core]._replace(waited=False), self.actions.all[action].functor
-        if name == PRINT:
-            return (self.cores.number(state),)
-        state = state._replace(last=action)
-        if name in self.environment.quiet:
-            return (self.cores.number(state),)
+        state, name = self.cores.all[core], self.actions.all[action].functor
+        if name == PRINT or name in self.environment.quiet:
+            last = state.last if name == PRINT else action
+            return (self.cores.number(state._replace(waited=False, last=last)),)
         had = state.new or bool(self._offers(state.choice))
-        draws = self._draws(state.choice, name)
-        drawn = (state._replace(choice=d, new=had or bool(self._offers(d)), drawn=True) for d in draws)
+        drawn = (
+            state._replace(waited=False, last=action, choice=d, new=had or bool(self._offers(d)), drawn=True)
+            for d in self._draws(state.choice, name)
+        )
         return tuple(map(self.cores.number, drawn))
 
     def act(self, number: int) -> tuple[int, int]:
@@ -343,8 +342,10 @@ class Agent(Mind):
         return done, NONE if on_goals else self._after_deed(core, done)
 
     def _after_deed(self, core: int, done: Done) -> int:
-        state = self.cores.all[core]._replace(planned=False, drawn=False)
-        return self.cores.number(state._replace(beliefs=done.beliefs, goals=done.goals, current=done.intention))
+        after = self.cores.all[core]._replace(
+            beliefs=done.beliefs, goals=done.goals, current=done.intention, planned=False, drawn=False
+        )
+        return self.cores.number(after)
 
     def next_deed(self, state: State) -> Deed | None:
         """The deed that the next job does, if it does one."""
@@ -359,23 +360,20 @@ class Agent(Mind):
         wanted = self.goals.all[state.goals]
         if deed.kind is DeedKind.DROP_GOAL:
             return self.drop_goal(state.beliefs, state.goals, intention, state.queue, goal)
-        if deed.goal is GoalKind.PERFORM:
-            number = self.number(post(intention, goal))
-            return done._replace(goals=self.goals.number(wanted | {goal}), intention=number), state.queue
-        beliefs = self.beliefs.all[state.beliefs]
-        met = self.reasoner.derived(beliefs, goal.term)
-        if met is not None:
-            left = self.after(state.beliefs, state.goals, intention, met)
-            elsewhere = any(
-                unify(goal.term, other.term, {}) is not None
-                for number in state.queue
-                for other in self.intentions.all[number].goals()
-            )
-            return left._replace(goals=left.goals if elsewhere else self.without(left.goals, goal)), state.queue
-        for other in sorted((g for g in wanted if g.kind is goal.kind), key=lambda g: plain(g.term)):
-            found = unify(goal.term, other.term, {})
-            if found is not None:  # some intention has it already
-                return self.after(state.beliefs, state.goals, intention, found), state.queue
+        if deed.goal is not GoalKind.PERFORM:
+            met = self.reasoner.derived(self.beliefs.all[state.beliefs], goal.term)
+            if met is not None:
+                left = self.after(state.beliefs, state.goals, intention, met)
+                elsewhere = any(
+                    unify(goal.term, other.term, {}) is not None
+                    for number in state.queue
+                    for other in self.intentions.all[number].goals()
+                )
+                return left._replace(goals=left.goals if elsewhere else self.without(left.goals, goal)), state.queue
+            for other in sorted((g for g in wanted if g.kind is goal.kind), key=lambda g: plain(g.term)):
+                found = unify(goal.term, other.term, {})
+                if found is not None:  # some intention has it already
+                    return self.after(state.beliefs, state.goals, intention, found), state.queue
         number = self.number(post(intention, goal))
         return done._replace(goals=self.goals.number(wanted | {goal}), intention=number), state.queue
 

@@ -12,6 +12,10 @@ DRAWS = 4096
 STATES = 2_000_000
 """States explored by default; the limit on memory is mostly met before."""
 
+RECENT = 4_096
+"""States without their queues whose successors are kept: breadth first, most that are asked again were asked just
+before. With all of them kept, a million states take up to twice the memory, and as long."""
+
 INTENTIONS = 6
 """With more intentions at once, the agent has probably fallen behind its percepts for good."""
 
