@@ -5,9 +5,9 @@
 `threshold`: one output, one bound, a fresh reading at each event. `agent`: the case study's agent over laps of the
 nominal run, which breaks its contract from the second lap on. `rover`: all four nodes over one mission with a fresh
 reading each time. `answers`: a threshold on each answer, which is paired with its input in each of the ways; for these,
-plain Python keeps the inputs by their number. The bags hold the threshold's readings, or answers with stamps. `arrays`:
-the threshold over 40 times as many readings that are arrays already, against numpy and a loop. Processor time, so that
-company on the machine matters less; memory is the peak of the process.
+plain Python keeps the inputs by their number. The bags hold the threshold's readings, or answers with stamps; beside
+them, rosbags alone yields the messages. `arrays`: the threshold over 40 times as many readings that are arrays already,
+against numpy and a loop. Processor time, so that company on the machine matters less; memory is the process' peak.
 """
 
 from __future__ import annotations
@@ -133,6 +133,16 @@ def stamped(path: Path, count: int) -> Path:
     return path
 
 
+def unread(path: Path) -> int:
+    """A bag's messages, of which nothing is read: rosbags alone."""
+    from rosbags.highlevel import AnyReader
+
+    with AnyReader([path]) as reader:
+        for _ in reader.readers[0].messages():
+            pass
+    return 0
+
+
 def loop(readings: list[float]) -> int:
     broken = 0
     for reading in readings:
@@ -205,11 +215,13 @@ def main() -> None:
             timed(f"answers by {by}, each a fresh reading", count, partial(judged, system, [], asked))
         for form, name in (("ros1", "v.bag"), ("SQLITE3", "v2"), ("MCAP", "v3")):
             record = bag(folder / name, count, form)
+            timed(f"rosbags alone, a bag ({form})", count, partial(unread, record))
             timed(f"threshold, a bag ({form})", count, partial(judged, threshold, [], record))
         mapping = "mapping: {in.r: temperature, out.v: temperature}"
         contract = ANSWERS.replace("std_msgs/Float64", "sensor_msgs/Temperature")
         answered = single(folder / "stamped", contract, f"{{answers: {{by: stamp}}, {mapping}}}")
         record = stamped(folder / "v4", count)
+        timed("rosbags alone, answers (SQLITE3)", count, partial(unread, record))
         timed("answers by stamp, a bag (SQLITE3)", count, partial(judged, answered, [], record))
     many = 40 * count
     data = np.random.default_rng(1).uniform(0, 119, many)

@@ -190,7 +190,7 @@ def ask(
     assert monitor.pairing is not None
     pairing, now = monitor.pairing, time_of(event)
     key = pairing.key(event, pairing.answers.output) if answer is None else answer.key
-    pairing.replied(watched, key)
+    pairing.replied(watched, (key,))
     missing = [n for n in watched.names if n not in monitor.paired and (n not in values or n in monitor.supposed)]
     if missing:
         watched.tally.too_early(n for n in missing if n not in monitor.supposed)

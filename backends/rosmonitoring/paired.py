@@ -9,6 +9,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
+from itertools import repeat
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -144,7 +145,7 @@ class Paired:
             return range(first, first + len(self._topics[topic]))
         second, rest = (self._batch.array(topic, (*path, part)) for part in ("sec", "nanosec"))
         if second is not None and rest is not None:
-            return [(time, "s") for time in (second.astype(np.int64) * 10**9 + rest).tolist()]
+            return zip((second.astype(np.int64) * 10**9 + rest).tolist(), repeat("s"))
         array = self._batch.array(topic, path)
         if array is not None:
             found: list[object] = array.tolist()
@@ -278,8 +279,7 @@ class Paired:
         first = low if self._by == "latency" and pairing.waiting else max(low, first)
         pairing.input(name)
         keys = [*self._numbers] if self._by != "latency" else []
-        for k in one.ids[low : first if keys else low].tolist():
-            pairing.heard(name, keys[k])
+        pairing.heard(name, [keys[k] for k in one.ids[low : first if keys else low].tolist()])
         for k in range(first, high):
             row = int(one.rows[k])
             event, key = self._batch.event(row), keys[one.ids[k]] if keys else None
@@ -303,8 +303,7 @@ class Paired:
         pairing.asked += high - low
         if self._by != "latency":
             (name, (first, _)), keys = next(iter(asked.ranges.items())), [*self._numbers]
-            for k in self._inputs[name].ids[first[low:high]].tolist():
-                pairing.replied(watched, keys[k])
+            pairing.replied(watched, [keys[k] for k in self._inputs[name].ids[first[low:high]].tolist()])
         for k in range(max(low, high - KEYS_KEPT), high) if watched.outputs else ():
             messages = {
                 name: tuple(self._place(name, one) for one in range(int(first[k]), int(last[k]) + 1))

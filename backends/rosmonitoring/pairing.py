@@ -15,7 +15,7 @@ import itertools
 import math
 from bisect import insort
 from collections import OrderedDict, deque
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from operator import attrgetter
@@ -131,27 +131,30 @@ class Replies:
     """The keys of earlier ones without an answer."""
     answered: OrderedDict[object, None] = field(default_factory=OrderedDict)
 
-    def heard(self, name: str, key: object) -> None:
-        if key is None or name not in self.watched.paired:
-            return
-        came = self.came.setdefault(key, set())
-        came.add(name)
-        if len(came) == len(self.watched.paired) and key not in self.passed:
-            del self.came[key]
-            self.waiting[key] = None
-            if key in self.answered:
-                self.answer(key)
-        _bound(self.came, self.waiting)
+    def heard(self, name: str, keys: Iterable[object]) -> None:
+        alone, came = len(self.watched.paired) == 1, self.came
+        for key in keys if name in self.watched.paired else ():
+            if key is None:
+                continue
+            if not alone:
+                came.setdefault(key, set()).add(name)
+            if (alone or len(came[key]) == len(self.watched.paired)) and key not in self.passed:
+                came.pop(key, None)
+                self.waiting[key] = None
+                if key in self.answered:
+                    self.answer((key,))
+            _bound(came, self.waiting)
 
-    def answer(self, key: object) -> None:
-        self.answered[key] = None
-        self.passed.pop(key, None)
-        if key in self.waiting:
-            earlier = self.waiting.popitem(last=False)[0]
-            while earlier is not key and earlier != key:
-                self.passed[earlier] = None
+    def answer(self, keys: Iterable[object]) -> None:
+        for key in keys:
+            self.answered[key] = None
+            self.passed.pop(key, None)
+            if key in self.waiting:
                 earlier = self.waiting.popitem(last=False)[0]
-        _bound(self.passed, self.answered)
+                while earlier is not key and earlier != key:
+                    self.passed[earlier] = None
+                    earlier = self.waiting.popitem(last=False)[0]
+            _bound(self.passed, self.answered)
         self.watched.tally.unanswered = len(self.passed)
 
     def pardon(self, key: object) -> None:
@@ -229,13 +232,13 @@ class Pairing:
         """The number of messages of an input that are later than a time, as far as they are kept."""
         return sum(message.time > ticks(time) for message in self.input(name).messages)
 
-    def heard(self, name: str, key: object) -> None:
+    def heard(self, name: str, keys: Sequence[object]) -> None:
         for replies in self.replies.values():
-            replies.heard(name, key)
+            replies.heard(name, keys)
 
-    def replied(self, watched: Watched, key: object) -> None:
+    def replied(self, watched: Watched, keys: Iterable[object]) -> None:
         if id(watched) in self.replies:
-            self.replies[id(watched)].answer(key)
+            self.replies[id(watched)].answer(keys)
 
     def begins(self, values: Mapping[str, Value]) -> None:
         """The values before any message: at no time and no place, so that they have no age."""
@@ -250,7 +253,7 @@ class Pairing:
         if self.answers.by != "latency":
             message = InputMessage(time, seconds, key, value, place)
             self._touched.append(message.key)
-            self.heard(name, key)
+            self.heard(name, (key,))
             if any(one.used and self._differ(name, one, message) for one in known.by_key.get(message.key, ())):
                 self.late = self.late or f"a message of {name} has the key of one that was answered before"
             known.keep(message)
