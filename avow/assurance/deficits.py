@@ -118,9 +118,17 @@ def deficits(
         "believed": [f"{v.id}: {r.method}" for v in views for r in v.records if r.run != run],
     }
     silent = [(v, method) for v in programs for method, _ in v.planned]
+    most = max((_unanswered_share(v) for v in leaves), default=0)
+    share = {"unanswered": f", up to {most} % of them" if most else ""}
     remedies = {"unrun": _install(unrun, missing), "programs": _install(silent, missing)}
     return tuple(
-        Deficit(key, len(claims), tuple(claims), words_of(key, len(claims)), _WORDS[key][2] + remedies.get(key, ""))
+        Deficit(
+            key,
+            len(claims),
+            tuple(claims),
+            words_of(key, len(claims)) + share.get(key, ""),
+            _WORDS[key][2] + remedies.get(key, ""),
+        )
         for key, claims in found.items()
         if claims
     )
@@ -152,6 +160,13 @@ def _by_hand(view: ObligationView, relied: Relied) -> bool:
     sure = relied.status in EXHAUSTIVE
     alike = [r for r in view.records if weigh(r).support is relied.status or (sure and weigh(r).support in EXHAUSTIVE)]
     return relied.status is not Status.REVIEWED and all(record.link is not Link.GENERATED for record in alike)
+
+
+def _unanswered_share(view: ObligationView) -> int:
+    """The greatest share of a record's drawn inputs that got no answer, in percent, rounded up."""
+    bounds = [e.entry.evidence.bound for e in view.counting]
+    counts = [(b.get("unanswered"), b.get("cases")) for b in bounds]
+    return max((-(-100 * n // of) for n, of in counts if isinstance(n, int) and isinstance(of, int) and of), default=0)
 
 
 def _unanswered(view: ObligationView) -> Iterator[str]:

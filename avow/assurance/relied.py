@@ -17,7 +17,7 @@ from avow.base.plain import count
 from avow.base.records import dataclass
 from avow.base.verdict import HypothesisKind, Isolation, Object, in_words
 from avow.evidence.obligation import Kind, Obligation, ProgramClaim
-from avow.evidence.record import AGREES, ISOLATION, Evidence
+from avow.evidence.record import AGREES, ISOLATION, RATE, Evidence
 from avow.evidence.status import Status, weigh
 
 if TYPE_CHECKING:
@@ -197,7 +197,7 @@ def seen(relied: Relied) -> str:
             runs, triggered = count(bound["runs"], "run"), bound.get("triggered", bound["runs"])
             of = runs if triggered == bound["runs"] else f"{count(triggered, 'triggered run')} of {bound['runs']}"
             worst = f"; the worst stratum: {bound['worst stratum']}" if "worst stratum" in bound else ""
-            return f"{of}, {failures} failed{worst}{_at_most(relied.record)}"
+            return f"{of}, {failures} failed{worst}{_at_most(relied.record, 'runs')}"
         case Status.TESTED if isinstance(bound.get("cases"), int):
             cases, triggered = bound["cases"], bound.get("triggered")
             if isinstance(triggered, int):
@@ -205,7 +205,7 @@ def seen(relied: Relied) -> str:
                 told = f"{few}{triggered} of {count(cases, 'case')} met its condition, none failed"
             else:
                 told = f"{count(cases, 'case')}, none failed"
-            return told + _at_most(relied.record)
+            return told + _at_most(relied.record, "cases")
         case Status.TESTED if isinstance(bound.get("depth"), int):
             return f"searched to step {bound['depth']}, not exhaustively"
         case Status.MONITORED if isinstance(bound.get("judged"), int):
@@ -218,8 +218,9 @@ def seen(relied: Relied) -> str:
             return f"{relied.status}, without a bound on failures"
 
 
-def _at_most(record: Evidence) -> str:
-    """Always with the confidence: without it the bound would seem certain."""
+def _at_most(record: Evidence, trials: str) -> str:
+    """Always with the confidence: without it the bound would seem certain. Only an experiment's runs represent the
+    robot's use; a generator draws cases of its own."""
     bound, confidence = upper_bound(record), record.bound.get("confidence")
     if bound is None:
         return ", with no bound on failures"
@@ -227,7 +228,8 @@ def _at_most(record: Evidence) -> str:
         sure = f"{_rounded(float(confidence), ROUND_FLOOR)} confidence"
     else:
         sure = "confidence not recorded"
-    return f" ({sure}: at most {_rounded(bound, ROUND_CEILING)} fail)"
+    of = "" if RATE in record.details else f" of {trials} drawn like these"
+    return f" ({sure}: at most {_rounded(bound, ROUND_CEILING)}{of} fail)"
 
 
 def _rounded(part: float, way: str) -> str:

@@ -92,6 +92,13 @@ class Facts:
     def old(self) -> int:
         return sum(r["run"] != self.case["run"]["id"] for v in self.views for r in records(v))
 
+    def unanswered(self) -> int:
+        """The greatest share of drawn inputs without an answer, in percent, rounded up."""
+        bounds = [r["bound"] for v in self.views for r in records(v) if v["obligation"]["kind"] != "program"]
+        return max(
+            (-(-100 * b["unanswered"] // b["cases"]) for b in bounds if {"unanswered", "cases"} <= b.keys()), default=0
+        )
+
     def proofs(self, *grades: str) -> int:
         asked = [p for p in self.case["proofs"] if p["obligation"].split("/")[2] in ("composition", "requirement")]
         return sum(not grades or p["grade"] in grades for p in asked)
@@ -255,7 +262,12 @@ def _seen(record: Json) -> Iterator[str]:
         if not whole and max(known) < _STRICT * upper(failed, trials, sure):
             return  # it says more than its sample shows
         told = f"{_percent(Fraction(str(sure)), ROUND_FLOOR, 2)} confidence" if _is(sure) else "confidence not recorded"
-        most = f" ({told}: at most {_percent(Fraction(str(max(known))), ROUND_CEILING, 2)} fail)"
+        drawn = (
+            ""
+            if "rate" in record["details"]
+            else f" of {'runs' if isinstance(runs, int) else 'cases'} drawn like these"
+        )
+        most = f" ({told}: at most {_percent(Fraction(str(max(known))), ROUND_CEILING, 2)}{drawn} fail)"
     if isinstance(runs, int):
         hit = runs if hit is None else hit
         of = _count(runs, "run") if hit == runs else f"{_count(hit, 'triggered run')} of {runs}"

@@ -244,7 +244,7 @@ def _whole(number: Callable[[Facts], int]) -> Callable[[Facts, re.Match[str], Bl
 _LEVELS = "|".join((*reversed(HOLDS), "not shown", "refuted"))
 _STATUS = "proved|checked|tested|monitored|reviewed|justified|argued|partial|unwritten|vacuous|unknown|not-run|error"
 _STATUS += "|stale|missing|unsupported|circular|refuted|contradictory"
-_BOUND = r"(?:, with no bound on failures| \([^()]*: at most [\d.]+ % fail\))?"
+_BOUND = r"(?:, with no bound on failures| \([^()]*: at most [\d.]+ %(?: of (?:cases|runs) drawn like these)? fail\))?"
 _SEEN = r"[Oo]bserved \d+ times?(?: on \d+ recorded runs?)?, none against it"
 _SEEN += rf"|(?:[Oo]nly )?\d+ of \d+ cases? met its condition, none failed{_BOUND}|\d+ cases?, none failed{_BOUND}"
 _SEEN += r"|searched to step \d+, not exhaustively"
@@ -287,8 +287,9 @@ RULES = (
     _rule("q4", r"\bA(\d+)(?= )", _says),
     _rule("q5", r"All (\d+)", _whole(lambda f: len(f.case["changes"]["entries"]))),
     _rule("q5", r"re-run: (\d+) guarantees?, same answer", _whole(lambda f: f.case["changes"]["again"])),
-    _rule("q6", rf"(\d+) ({'|'.join(_DEFICITS)})(?= $)", _deficit),
-    _rule("deficits", rf"(\d+) ␟ ({'|'.join(_DEFICITS)})(?= ␟)", _deficit),
+    _rule("q6", rf"(\d+) ({'|'.join(_DEFICITS)})(?= $|, up to)", _deficit),
+    _rule("deficits", rf"(\d+) ␟ ({'|'.join(_DEFICITS)})(?= ␟|, up to)", _deficit),
+    _rule("", r", up to (\d+) % of them", _whole(Facts.unanswered)),
     _rule(
         "q7",
         r"(\d+) of (\d+) proofs? re-established in this run",

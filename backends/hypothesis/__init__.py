@@ -30,7 +30,7 @@ class HypothesisBackend(Backend):
 
     name = "hypothesis"
     title = "Property-based tests of a Python function, or of the node's own class, generated from the contract"
-    version = "14"
+    version = "15"
     strength = Verdict.TESTED
     uses_steps = False
     uses_wiring = False

@@ -28,7 +28,7 @@ from avow.solving.replay import opaque_sorts
 from . import callbacks, export
 from .convention import ANY, EXACT
 from .exchange import QUESTION, Answer, Question, Tried
-from .judging import failure_bound, shown_bound
+from .judging import MEANING, failure_bound, shown_bound
 from .subject import subject
 from .tuning import CONFIDENCE, REJECTED_CASES
 
@@ -204,10 +204,6 @@ def _tested(outcome: Outcome, answer: Answer, own: Tried, wanted: int, seed: int
     if hits:
         bound["triggered"] = least
         bound["failure_probability_when_triggered_below"] = failure_bound(least)
-    meaning = (
-        "if the cases were independent: with this confidence, a case drawn as these were fails with a probability "
-        "below the bound; it is no probability about the robot's own inputs"
-    )
     replayed = f", {answer.replayed} that refuted it or a neighbour before" if answer.replayed else ""
     if answer.replayed:
         bound["replayed"] = answer.replayed
@@ -219,7 +215,7 @@ def _tested(outcome: Outcome, answer: Answer, own: Tried, wanted: int, seed: int
     summary = f"{cases}{replayed}, none breaks it (seed {seed}; {chance})"
     if answer.valid < wanted:
         summary += f"; the generator has no more than these, of {wanted} wanted"
-    details = {**outcome.details, "meaning": meaning}
+    details = {**outcome.details, "meaning": MEANING}
     return replace(outcome, verdict=Verdict.TESTED, summary=summary, bound=bound, details=details)
 
 

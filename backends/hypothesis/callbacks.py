@@ -37,7 +37,7 @@ from avow.system.topics import whole_name
 from . import tuning
 from .convention import ANY, EXACT, SPECIAL
 from .export import cases, numbers
-from .judging import failure_bound, shown_bound
+from .judging import MEANING, failure_bound, shown_bound
 
 UNSTEADY = "undeclared input: asked the same again from its start, another process publishes otherwise"
 
@@ -104,8 +104,10 @@ class _Count:
     held: int = 0
     excused: int = 0
     undecided: int = 0
+    runs: int = 0
+    """The drawn runs in which it was judged."""
     met: Sequence[int] = ()
-    """Of each of its conditions: in how many runs it was met."""
+    """Of each of its conditions: in how many of these runs it was met."""
     reason: str = ""
 
 
@@ -204,7 +206,10 @@ class _Work:
                 count.held += one.held
                 count.excused += one.excused
                 count.undecided += one.undecided
-                count.met = [n + (drawn and m) for n, m in zip(count.met or [0] * len(one.met), one.met, strict=True)]
+                judged_here = drawn and one.held > 0
+                count.runs += judged_here
+                before = count.met or [0] * len(one.met)
+                count.met = [n + (judged_here and m) for n, m in zip(before, one.met, strict=True)]
                 count.reason = count.reason or one.reason
                 if self.wrong(name, run, judged) is not None:
                     self.failing.setdefault(name, events)
@@ -359,18 +364,20 @@ class _Work:
             why = unsteady or stopped
         if why:
             return replace(outcome, summary=why)
-        if not (triggered := min(count.met, default=self.runs)):
+        if not (triggered := min(count.met, default=count.runs)):
             return replace(outcome, summary=f"in none of {self.runs} runs was its condition met", vacuous=True)
         bound |= {"confidence": tuning.CONFIDENCE, "triggered": triggered}
-        bound["failure_probability_below"] = failure_bound(self.runs)
+        bound["failure_probability_below"] = failure_bound(count.runs)
         bound["failure_probability_when_triggered_below"] = failure_bound(triggered)
         before = f", {self.replayed} that refuted it or a neighbour before" if self.replayed else ""
-        before += f", {self.unanswered} messages without an answer" if self.unanswered else ""
+        part = self.unanswered / self.messages
+        before += f", {self.unanswered} messages without an answer ({part:.0%})" if self.unanswered else ""
         summary = (
             f"{self.runs} drawn runs of {self.messages} messages{before}: held at {count.held} judgements, none breaks "
             f"it (seed {self.limits.seed}; 95 %: below {shown_bound(triggered)} of such runs fail)"
         )
-        return replace(outcome, verdict=Verdict.TESTED, summary=summary)
+        details["meaning"] = MEANING
+        return replace(outcome, verdict=Verdict.TESTED, summary=summary, bound=bound)
 
 
 def _end(events: Sequence[Event]) -> int:

@@ -80,6 +80,13 @@ def failure_bound(cases: int) -> float:
     return 1.0 if cases == 0 else math.ceil((1 - math.pow(1 - CONFIDENCE, 1 / cases)) * 10**6) / 10**6
 
 
+MEANING = (
+    "if the cases were independent: with this confidence, a case drawn as these were fails with a probability below "
+    "the bound; it is no probability about the robot's own inputs"
+)
+"""The condition of a bound, for the details of a record."""
+
+
 def shown_bound(cases: int) -> str:
     """The same with two digits, rounded up."""
     return f"{Context(prec=2, rounding=ROUND_CEILING).create_decimal(repr(failure_bound(cases))):g}"

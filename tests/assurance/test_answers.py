@@ -24,7 +24,7 @@ from avow.assurance.model import Case
 from avow.base.plain import identifiers, words_of
 from avow.base.verdict import Hypothesis, HypothesisKind, Link, Object, Verdict, bound
 from avow.evidence.obligation import SYSTEM_LEVEL, Kind, Obligation
-from avow.evidence.record import Evidence
+from avow.evidence.record import RATE, Evidence
 from avow.system.plan import EnvironmentInput, Hazard, Requirement, Statement, System
 
 NODES = {"a": ["g", "h"], "b": ["g"]}
@@ -307,7 +307,7 @@ def test_a_side_condition_brings_what_its_proof_used_and_a_guarantee_what_its_no
     assert found.weakest_evidence is not None
     assert (found.weakest_evidence.node, found.weakest_evidence.words) == (
         "a",
-        "10 cases, none failed (confidence not recorded: at most 30 % fail)",
+        "10 cases, none failed (confidence not recorded: at most 30 % of cases drawn like these fail)",
     )
     named = ("b", "b.g", "b/hoare")
     hazards = tuple(Hazard(name, "It burns", "critical", mitigated_by=(name,)) for name in named)
@@ -476,14 +476,23 @@ def test_deficits_are_of_all_that_the_page_shows() -> None:
         (
             Verdict.TESTED,
             "hypothesis",
+            {"runs": 9, "triggered": 9, "failure_probability_below": 0.3, "confidence": 0.95},
+            "9 runs, 0 failed (95 % confidence: at most 30 % of runs drawn like these fail)",
+        ),
+        (
+            Verdict.TESTED,
+            "hypothesis",
             {"cases": 300, "triggered": 4, "failure_probability_when_triggered_below": 0.527, "confidence": 0.95},
-            "only 4 of 300 cases met its condition, none failed (95 % confidence: at most 53 % fail)",
+            (
+                "only 4 of 300 cases met its condition, none failed (95 % confidence: "
+                "at most 53 % of cases drawn like these fail)"
+            ),
         ),
         (
             Verdict.TESTED,
             "hypothesis",
             {"cases": 9, "failure_probability_below": 0.3, "confidence": 0.997},
-            "9 cases, none failed (99 % confidence: at most 30 % fail)",
+            "9 cases, none failed (99 % confidence: at most 30 % of cases drawn like these fail)",
         ),
         (
             Verdict.MONITORED,
@@ -494,7 +503,10 @@ def test_deficits_are_of_all_that_the_page_shows() -> None:
     ],
 )
 def test_what_was_seen_has_one_wording(verdict: Verdict, method: str, bound: dict[str, object], told: str) -> None:
-    found = case(subject(PROSE), [*GUARANTEES], [evidence(GUARANTEES[0], verdict, method, bound=bound)])
+    details = {RATE: []} if method == "experiment" else {}
+    found = case(
+        subject(PROSE), [*GUARANTEES], [evidence(GUARANTEES[0], verdict, method, bound=bound, details=details)]
+    )
     assert found.answers.weakest is not None
     assert found.answers.weakest.words == told
 

@@ -13,6 +13,7 @@ from helpers import some
 from avow.backend_kit import one_step
 from avow.backend_kit.protocol import Job, Limits
 from avow.backends.hypothesis import tuning
+from avow.backends.hypothesis.judging import MEANING, failure_bound
 from avow.base.verdict import Object, Outcome, Verdict
 from avow.evidence.record import CASE
 from avow.pipeline.evidence_keys import surroundings
@@ -78,6 +79,24 @@ def test_a_class_that_never_answers_a_condition_is_not_tested(tmp_path: Path, fo
     contract = CONTRACT.replace("guarantee high", f"guarantee silent ( {formula} )\n  guarantee high")
     found = asked(job(tmp_path / "w", "rospy", text, "{cases: 300}", contract))["silent"]
     assert (found.verdict, found.vacuous) == (Verdict.UNKNOWN, True), found.summary
+
+
+@pytest.mark.slow
+def test_a_run_counts_only_if_the_guarantee_was_judged_in_it(tmp_path: Path) -> None:
+    """The class answers nothing in the runs whose first message is high."""
+    mute = "self.mute = getattr(self, 'mute', message.data > 300)"
+    text = DIRECT.replace(
+        "self.said.publish(self.level)", f"{mute}\n        self.mute or self.said.publish(self.level)"
+    )
+    contract = CONTRACT.replace("guarantee high", "guarantee any ( out.status in {green, red} )\n  guarantee high")
+    found = asked(job(tmp_path / "w", "rospy", text, "{cases: 600}", contract))["any"]
+    assert found.verdict is Verdict.TESTED, found.summary
+    runs, judged = found.bound["runs"], found.bound["triggered"]
+    assert isinstance(runs, int)
+    assert isinstance(judged, int)
+    assert 0 < judged < runs
+    assert found.bound["failure_probability_below"] == failure_bound(judged)
+    assert found.details["meaning"] == MEANING
 
 
 MUTANTS = {

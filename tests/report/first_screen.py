@@ -85,7 +85,9 @@ def words(found: Case) -> list[str]:
     """One wording for one thing: bounds with their confidence, deficits, what was looked at, assumptions on paper."""
     a, told = found.answers, []
     for said in (a.weakest.words if a.weakest else "", a.next_weakest):
-        if " fail)" in said and not re.search(r"confidence( not recorded)?: at most [0-9.]+ % fail\)", said):
+        if " fail)" in said and not re.search(
+            r"confidence( not recorded)?: at most [0-9.]+ %( of \w+ drawn like these)? fail\)", said
+        ):
             told.append(f"a bound without its confidence: {said!r}")
     if found.deficits and a.weakened not in a.statement:
         told.append(f"{a.weakened!r} is counted otherwise when it is signed: {a.statement!r}")
