@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from itertools import takewhile
 
 from avow.assurance.answers import Assumption, Baseline, ChangeLine, Changes, Deficit, Level
 from avow.assurance.deficits import words_of
 from avow.assurance.model import Case, ObligationView, RequirementView
+from avow.assurance.naming import cut
 from avow.base.codec import canonical
 from avow.base.files import sha256
 from avow.evidence.obligation import Kind
@@ -17,6 +19,8 @@ from avow.evidence.status import Status
 KINDS = ("open", "gone", "weaker", "meaning", "expired", "assumption", "deficit", "new", "better")
 """Worst first."""
 MARKS = {"open": "✘", "better": "▲", "meaning": "≠", "new": "+"}
+EDITED = 40
+"""Characters of a formula, old or new, in a line about its edit; the row of the change has it in full."""
 _RANK = {level: -at for at, level in enumerate(Level)}
 _PASSING = ("believed",)
 """Deficits of the run, not of the case."""
@@ -69,7 +73,7 @@ def changes(
     then = {item[0]: item for item in old.guarantees}
     titles = {view.id: view.obligation.claim for view in guarantees}
     below = list(_guarantees(then, now, titles))
-    under = {r.id: [_edit(entry) for entry in below if entry.subject in r.closure] for r in requirements}
+    under = {r.id: [entry.words for entry in below if entry.subject in r.closure] for r in requirements}
     shown = [replace(e, edits=tuple(under.get(e.subject, ()))) for e in _requirements(old, requirements)] + below
     lost = any(entry.kind in ("open", "gone", "weaker") for entry in shown)
     entries = [*shown, *_assumptions(old, assumptions), *_deficits(old, deficits)]
@@ -82,8 +86,18 @@ def changes(
     return Changes(by, tuple(sorted(entries, key=lambda entry: KINDS.index(entry.kind))), again)
 
 
-def _edit(entry: ChangeLine) -> str:
-    return f"{entry.words}: was {entry.before}, is {entry.after}" if entry.kind == "meaning" else entry.words
+def _edit(what: str, before: str, after: str) -> str:
+    """``REQ1 was “in.r < 120”, is “in.r < 130”``: the formulas from two words before their difference to its end."""
+    was, now = before.split(), after.split()
+    if was == now or not was or not now:
+        return f"{what} means something else"
+    pairs = list(zip(was, now, strict=False))
+    start = next((at for at, (a, b) in enumerate(pairs) if a != b), len(pairs))
+    same = zip(reversed(was[start:]), reversed(now[start:]), strict=False)
+    end = sum(1 for _ in takewhile(lambda pair: pair[0] == pair[1], same))
+    first = max(0, start - 2)
+    old, new = (cut(" ".join(text[first : len(text) - end]), EDITED) for text in (was, now))
+    return f"{what} was “{old}”, is “{new}”"
 
 
 def _guarantee(view: ObligationView) -> tuple[str, str, str, str, str]:
@@ -110,7 +124,7 @@ def _requirements(old: Baseline, requirements: Sequence[RequirementView]) -> Ite
         elif _RANK[r.level] > _RANK[was]:
             yield ChangeLine("better", r.id, f"{r.id} was {was}, and is {r.level}", was.value, r.level.value)
         if meaning != r.meaning:
-            yield ChangeLine("meaning", r.id, f"{r.id} says something else", formula, r.formal)
+            yield ChangeLine("meaning", r.id, _edit(r.id, formula, r.formal), formula, r.formal)
     for name in then:
         if name not in {r.id for r in requirements}:
             yield ChangeLine("gone", name, f"{name} is not claimed any more", then[name][2], "")
@@ -129,7 +143,7 @@ def _guarantees(
         _, old_meaning, old_status, old_formula, _ = then[name]
         is_, was = Status(status), Status(old_status)
         if meaning != old_meaning:
-            yield ChangeLine("meaning", name, f"{title} means something else", old_formula, formula)
+            yield ChangeLine("meaning", name, _edit(title, old_formula, formula), old_formula, formula)
         if is_ is not was:
             kind = "better" if is_.rank > was.rank else "weaker" if is_.supports else "open"
             yield ChangeLine(kind, name, f"{was} → {is_}: {title}", old_status, status)

@@ -26,6 +26,7 @@ from avow.assurance.answers import (
 from avow.assurance.changes import MARKS, baseline_of
 from avow.assurance.deficits import briefly, of_deficits
 from avow.assurance.model import Case, Gate, NodeView, ObligationView, RequirementView
+from avow.assurance.naming import cut
 from avow.assurance.rates import NO_RATE
 from avow.assurance.relied import (
     EVIDENCE,
@@ -45,7 +46,7 @@ from avow.evidence.obligation import SYSTEM_LEVEL, Kind
 from avow.evidence.status import Status
 from avow.system.statements import GENERAL
 
-ROWS, WORST, NODES, SQUARES, LINES, OWNERS, REASON = 6, 3, 8, 12, 5, 3, 72
+ROWS, WORST, NODES, SQUARES, LINES, OWNERS, REASON = 6, 3, 8, 12, 3, 3, 72
 """The most requirements that have a row each; else the number of the worst, and of refutations; nodes; squares for a
 node; changes; owners; characters of a counterexample."""
 _FELLED = (Kind.GUARANTEE, Kind.REQUIREMENT, Kind.COMPOSITION, Kind.PROGRAM, Kind.SANITY, Kind.WELL_FORMED)
@@ -278,17 +279,14 @@ def _refuted(
     worst, *others = first.values()
     shown = [worst, *sorted(others, key=lambda v: v.obligation.node != SYSTEM_LEVEL)][:WORST]
     told = [
-        f"{titles.get(v.obligation.node, 'the whole')}: “{v.obligation.claim.rstrip('.')}” ({_cut(refutation(v)[1])})"
+        f"{titles.get(v.obligation.node, 'the whole')}: “{v.obligation.claim.rstrip('.')}”"
+        f" ({cut(refutation(v)[1], REASON)})"
         for v in shown
     ]
     more = f"; and {count(len(wrong) - len(shown), 'more claim')}" if len(wrong) > len(shown) else ""
     names = {level: [r.id for r in requirements if r.level is level] for level in (Level.REFUTED, Level.NOT_SHOWN)}
     takes = "".join(f" Requirements {level}: {listed(of, 6)}." for level, of in names.items() if of)
     return "Refuted: " + "; ".join(told) + f"{more}.{takes}"
-
-
-def _cut(text: str) -> str:
-    return text if len(text) <= REASON else text[: REASON - 1].rstrip() + "…"
 
 
 def _lines(assumptions: Sequence[Assumption]) -> Iterable[SupposedLine]:
@@ -325,14 +323,13 @@ def _owners(assumptions: Sequence[Assumption]) -> str:
 def _changed(changes: Changes) -> tuple[tuple[str, str], ...]:
     if not changes.against:
         return (("", "None has been signed."),)
-    shown = [(MARKS.get(e.kind, "▼"), e.words) for e in changes.entries]
+    edits = [e for e in changes.entries if e.kind == "meaning"][:1]  # the cause before what came of it
+    ordered = [*edits, *(e for e in changes.entries if e not in edits)]
+    shown = [(MARKS.get(e.kind, "▼"), e.words) for e in ordered]
     if len(shown) > LINES:
-        worse = sum(e.worse for e in changes.entries[LINES - 1 :])
-        better = len(shown) - (LINES - 1) - worse
-        rest = " and ".join(
-            p for p in (f"{worse} more worse or other" * bool(worse), f"{better} better" * bool(better)) if p
-        )
-        shown = [*shown[: LINES - 1], ("…", rest)]
+        left = ordered[LINES - 1 :]
+        better = sum(not e.worse for e in left)
+        shown = [*shown[: LINES - 1], ("…", f"{len(left)} more" + (f", {better} of them better" if better else ""))]
     if not shown:
         shown = [("=", "Nothing.")]
     return (

@@ -17,6 +17,11 @@ FOUNDATION = ("assumptions-satisfiable", "consistent", "realizable")
 """Sanity properties without which a node's guarantees have no meaning."""
 
 
+def cut(text: str, most: int) -> str:
+    """The text, or its beginning with an ellipsis: so many characters in all."""
+    return text if len(text) <= most else text[: most - 1].rstrip() + "…"
+
+
 def requirement_claim(name: str) -> str:
     return f"requirement:{name}"
 

@@ -36,10 +36,12 @@ def recount(folder: Path) -> list[str]:
 
 def recounted(page: str, data: bytes) -> list[str]:
     """The same, of a page's text and the bytes of report.json. Raises ValueError where these are no JSON."""
-    facts = Facts(json.loads(data))
-    quoted = facts.quoted | {hashlib.sha256(data).hexdigest()}
+    facts, mark = Facts(json.loads(data)), hashlib.sha256(data).hexdigest()
+    named = set(re.findall(r"SHA-256 <code>([0-9a-f]{64})<", page))
+    quoted = facts.quoted | named
     letters = sorted((text for text in quoted if NUMBER.search(text) and _TEXT.search(text)), key=len, reverse=True)
-    return [fault for block in blocks(page) for fault in _wrong(block, facts, letters)]
+    other = [f"report.json is not the one that the page names: its SHA-256 is {mark}"] if named - {mark} else []
+    return other + [fault for block in blocks(page) for fault in _wrong(block, facts, letters)]
 
 
 def _wrong(block: Block, facts: Facts, letters: list[str]) -> list[str]:

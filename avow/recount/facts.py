@@ -33,6 +33,7 @@ class Facts:
         self.views: list[Json] = case["obligations"]
         self.guarantees = [v for v in self.views if v["obligation"]["kind"] == "guarantee"]
         self.hazards: list[Json] = case.get("hazards") or []
+        self.changes: list[Json] = list(map(_flat, case["changes"]["entries"]))
         self.gates = [g for g in case["gates"] if not g.get("idle")]
         self.failing = [g for g in case["gates"] if not g["passed"]]
         self.quoted = {" ".join(text.split()) for text in self._texts()}
@@ -321,6 +322,13 @@ def _is(value: object) -> bool:
 
 def _count(number: int, word: str) -> str:
     return f"{number} {word}{'' if number == 1 else 's'}"
+
+
+def _flat(value: Any) -> Any:
+    """The same with each text as a page has it: one blank in place of several."""
+    if isinstance(value, dict):
+        return {key: _flat(item) for key, item in value.items()}
+    return " ".join(value.split()) if isinstance(value, str) else list(map(_flat, value))
 
 
 def _strings(value: Any) -> Iterator[str]:

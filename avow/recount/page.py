@@ -38,6 +38,8 @@ class _Reader(HTMLParser):
             section = has.get("aria-labelledby") or has.get("id", section)
         if tag in _BREAKS:
             self.flush()
+        elif tag == "br":
+            self.parts.append(" ")
         elif tag == "td" or (tag == "span" and self.open and self.open[-1][0] == "row"):
             self.parts.append(CELL)
         if tag not in _VOID:

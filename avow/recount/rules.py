@@ -6,6 +6,7 @@ is of another kind, and other rules see it.
 
 from __future__ import annotations
 
+import math
 import re
 from collections import Counter
 from collections.abc import Callable
@@ -224,6 +225,28 @@ def _objectives(facts: Facts, match: re.Match[str], _block: Block) -> _Numbers:
     return str(found[match[2]]), match[2]
 
 
+def _change(facts: Facts, match: re.Match[str], _block: Block) -> _Numbers:
+    """A row of the changes: an entry's kind, its words, claim and edits, and its state before and after."""
+    row = [cell.strip() for cell in match.groups()]
+    for e in facts.changes:
+        claim = re.sub(r".*?/(.*)/guarantee/(.*)", r"\1.\2", e["subject"])
+        texts = {" ".join(filter(None, (e["words"], name, *e.get("edits", ())))) for name in ("", claim)}
+        if row[1] in texts and [row[0], *row[2:]] == [e["kind"], e["before"], e["after"]]:
+            least, most = (e["kind"] == "deficit" and facts.deficit(e["subject"])) or (0, math.inf)
+            signed = dict(facts.case["baseline"]["deficits"]).get(e["subject"], 0)
+            if e["kind"] != "deficit" or (int(row[2]) == signed and least <= int(row[3]) <= most):
+                return match.groups()
+    return "no such change", *match.groups()[1:]
+
+
+def _rest(facts: Facts, _match: re.Match[str], _block: Block) -> _Numbers:
+    """The changes that the screen counts only: the first edit and the next worst change are in words."""
+    edits = [e for e in facts.changes if e["kind"] == "meaning"][:1]
+    left = [e for e in facts.changes if e not in edits][2 - len(edits) :]
+    better = sum(e["kind"] == "better" for e in left)
+    return str(len(left)), str(better) if better else None
+
+
 def _policy(facts: Facts, match: re.Match[str], _block: Block) -> _Numbers:
     """A demand's own numbers: the policy's."""
     asked = [str(gate["asks"]) for gate in facts.case["gates"]]
@@ -254,6 +277,8 @@ _WHY = r"fails\. (.*?)(?:; and (\d+) more)?(?=\.? Next:|\.? $)"
 _DAY = r"(\d{4}-\d\d-\d\d)"
 
 RULES = (
+    _rule("q5", r"^ (.*) $", lambda f, m, _: m.groups() if m[1] in [e["words"] for e in f.changes] else None),
+    _rule("changes", r"^ ␟([^␟]*)␟([^␟]*)␟([^␟]*)␟([^␟]*)$", _change),
     _rule("", rf"\b({_SEEN})", _seen),
     _rule("", r"\b(at most [\d.]+ % of (?:steps|runs) fail, at [\d.]+ %) confidence", lambda f, m, _: (f.rate(m[1]),)),
     _rule("", r"Not shown: (\d+) of (\d+) requirements? not validated", lambda f, _m, _b: _unread(f)),
@@ -285,7 +310,8 @@ RULES = (
     _rule("q4", rf"assumed since {_DAY}(?: to {_DAY})?", _days),
     _rule("q4", rf"(?:until|the first ends) {_DAY}", _days),
     _rule("q4", r"\bA(\d+)(?= )", _says),
-    _rule("q5", r"All (\d+)", _whole(lambda f: len(f.case["changes"]["entries"]))),
+    _rule("q5", r"All (\d+)", _whole(lambda f: len(f.changes))),
+    _rule("q5", r"^ (\d+) more(?:, (\d+) of them better)? $", _rest),
     _rule("q5", r"re-run: (\d+) guarantees?, same answer", _whole(lambda f: f.case["changes"]["again"])),
     _rule("q6", rf"(\d+) ({'|'.join(_DEFICITS)})(?= $|, up to)", _deficit),
     _rule("deficits", rf"(\d+) ␟ ({'|'.join(_DEFICITS)})(?= ␟|, up to)", _deficit),

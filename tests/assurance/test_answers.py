@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from assurance.sample import TODAY, case, evidence, guarantee, node_plan, obligation, rover_case, system
 from avow.assurance.answers import ABOUT, MEANINGS, PLATFORM, REACTION, START, TOOLS, Assumption, Level, Sort, Tone
 from avow.assurance.case import as_of, conclude_again
-from avow.assurance.changes import KINDS, baseline_of
+from avow.assurance.changes import KINDS, _edit, baseline_of
 from avow.assurance.deficits import _WORDS
 from avow.assurance.deficits import words_of as deficit_words
 from avow.assurance.first_screen import WARNED, _lines, _owners
@@ -383,6 +383,10 @@ def test_what_means_something_else_shows_both_formulas() -> None:
     )
     (changed,) = [e for e in now.changes.entries if e.kind == "meaning"]
     assert (changed.before, changed.after) == ("", "x > 2")
+    assert _edit("R", "", "x > 2") == "R means something else"
+    assert _edit("R", "0 ≤ in.r < 120 ⇒ g", "0 ≤ in.r < 130 ⇒ g") == "R was “in.r < 120”, is “in.r < 130”"
+    assert _edit("R", "a ∧ b", "a ∧ b ∧ c") == "R was “∧ b”, is “∧ b ∧ c”"
+    assert _edit("R", "b ∧ b", "b") == "R was “b ∧ b”, is “b”"
 
 
 def test_the_first_screen_of_a_full_case_is_in_plain_words() -> None:

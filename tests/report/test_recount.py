@@ -5,17 +5,22 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from fractions import Fraction
 from functools import cache
 from pathlib import Path
+from random import Random
 
 import pytest
 from assurance.sample import case as make_case
 from assurance.sample import evidence, guarantee, keys_of, node_plan, system
 from assurance.test_rates import sampled, three
 
+from avow.assurance.answers import Baseline
+from avow.assurance.changes import KINDS, baseline_of
 from avow.assurance.deficits import _WORDS, words_of
 from avow.assurance.model import Case
+from avow.base.files import sha256
 from avow.base.verdict import Counterexample, Verdict
 from avow.evidence.ledger import Ledger
 from avow.kernel.rates import tail
@@ -26,7 +31,7 @@ from avow.recount.facts import Facts, upper
 from avow.recount.page import blocks
 from avow.recount.rules import _DEFICITS
 from avow.report import formats, render_all
-from avow.system.plan import Finding, Hazard, Requirement
+from avow.system.plan import EnvironmentInput, Finding, Hazard, Requirement
 from report.test_answers_page import CASES as PAGES
 from report.test_answers_page import REPORTS
 
@@ -92,6 +97,52 @@ def changed(page: str) -> Iterator[tuple[str, str]]:
 @pytest.mark.parametrize("name", CASES)
 def test_a_true_page_is_borne_out(name: str) -> None:
     assert recounted(*made(name)) == []
+
+
+def test_another_report_json_is_named_as_such() -> None:
+    page, data = made("rate")
+    (line,) = recounted(page, data + b"\n")
+    assert line.startswith("report.json is not the one that the page names")
+
+
+def _signed_first(seed: int) -> Case:
+    """A case of random claims after a signature of another one: every kind of change may occur."""
+    random = Random(seed)
+    limits = ["in.r < 120 ⇒ out.s = 1", "in.r < 130 ⇒ out.s = 1", "47 runs, 0 failed; the worst stratum: 3"]
+    verdicts = [Verdict.PROVED, Verdict.TESTED, Verdict.REFUTED]
+    title = "It is 1 of 2 cases, 3 answers from earlier runs"
+
+    def drawn(old: Baseline | None) -> Case:
+        targets = [
+            replace(guarantee("n", name, f"{title} {name}", formula), digest=sha256(formula))
+            for name in "abcd"
+            if random.random() < 0.8
+            for formula in [random.choice(limits)]
+        ]
+        records = [evidence(target, random.choice(verdicts)) for target in targets]
+        names = [f"n.{target.name}" for target in targets]
+        asked = [Requirement(f"R{at}", title, random.choice(limits), None, tuple(names)) for at in range(3)]
+        asked = random.sample(asked, random.randint(0, 3))
+        assumed = [EnvironmentInput(f"in.{x}", "in.x < 3", f"{x} of 12") for x in "xy" if random.random() < 0.5]
+        subject = system({"n": [t.name for t in targets]}, requirements=asked, environment=assumed)
+        return make_case(subject, targets, records, baseline=old)
+
+    return drawn(baseline_of(drawn(None), "signed/rover/1.json", "A. Person 2", "2026-11-20", "2027-11-20"))
+
+
+def test_changes_since_a_signature_are_borne_out_and_changed_ones_found() -> None:
+    found = set[str]()
+    for seed in range(30):
+        later = _signed_first(seed)
+        texts = dict(formats(later))
+        page, data = texts["index.html"], texts["report.json"].encode()
+        assert recounted(page, data) == [], seed
+        found |= {entry.kind for entry in later.changes.entries}
+        if seed < 3:
+            rest = page.partition('id="changes"')[0]
+            lies = [(near, lie) for near, lie in changed(page) if lie.startswith(rest) and 'id="gates"' not in near]
+            assert [near for near, lie in lies if not recounted(lie, data)] == []
+    assert found >= {*KINDS} - {"expired"}
 
 
 def test_each_kind_of_deficit_is_recounted() -> None:

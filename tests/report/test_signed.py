@@ -56,8 +56,8 @@ def test_a_signature_by_name_is_the_baseline(tmp_path: Path) -> None:
     other = replace(G, formula="x > 2", digest="e" * 64)
     moved = case(SUBJECT, [other], [evidence(other, Verdict.REFUTED)], baseline=found)
     (line,) = [entry for entry in moved.changes.entries if entry.subject == "R" and entry.kind == "open"]
-    assert line.edits[0] == "“n does g” means something else: was x > 1, is x > 2"
-    assert "was x &gt; 1, is x &gt; 2" in render_answers(moved)
+    assert line.edits[0] == "“n does g” was “x > 1”, is “x > 2”"
+    assert "was “x &gt; 1”, is “x &gt; 2”" in render_answers(moved)
 
 
 def test_the_newest_that_verifies_counts(tmp_path: Path) -> None:
