@@ -274,6 +274,10 @@ class Baseline:
     deficits: tuple[tuple[str, int], ...]
     checked: str = ""
     """How its signature was verified, in words."""
+    hazards: tuple[tuple[str, str, str], ...] = field(default=(), metadata=LATER)
+    """(id, meaning, level)."""
+    gates: tuple[tuple[str, str, bool], ...] = field(default=(), metadata=LATER)
+    """(id, title, whether it passed) of the gates that were asked. Empty: signed before hazards and gates were."""
 
 
 @dataclass(frozen=True, slots=True)

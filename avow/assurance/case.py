@@ -164,7 +164,7 @@ def conclude(facts: Facts) -> Case:
     weakened = deficits(
         views, requirements, supposed, listed, findings, relied, single, hazards, facts.run.id, missing_tools(facts)
     )
-    changed = changes(facts.baseline, requirements, views, supposed, weakened)
+    changed = changes(facts.baseline, requirements, views, supposed, weakened, hazards, found)
     basis = {n for c in closed.values() for n in c.claims} if closed else set(whole.claims)
     basis |= {n for h in hazards for n in h.closure}
     weakest = weakest_of(basis, by_id, relied, titles)

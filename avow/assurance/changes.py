@@ -8,7 +8,8 @@ from itertools import takewhile
 
 from avow.assurance.answers import Assumption, Baseline, ChangeLine, Changes, Deficit, Level
 from avow.assurance.deficits import words_of
-from avow.assurance.model import Case, ObligationView, RequirementView
+from avow.assurance.hazards import HazardView
+from avow.assurance.model import Case, Gate, ObligationView, RequirementView
 from avow.assurance.naming import cut
 from avow.base.codec import canonical
 from avow.base.files import sha256
@@ -39,15 +40,26 @@ def baseline_of(case: Case, name: str = "", who: str = "", signed_on: str = "", 
         guarantees=tuple(map(_guarantee, case.guarantees)),
         assumptions=tuple((s.key, s.words, s.until) for s in case.assumptions),
         deficits=tuple((w.key, w.count) for w in case.deficits if w.key not in _PASSING),
+        hazards=tuple((h.hazard.id, h.meaning, h.level.value) for h in case.hazards),
+        gates=tuple((g.id, g.title, g.passed) for g in case.gates if not g.idle),
     )
     return replace(found, content=content_of(found))
 
 
+def is_signed(case: Case, signed: Baseline) -> bool:
+    """Whether a case is the signed one."""
+    now = baseline_of(case)
+    return content_of(now if signed.gates else replace(now, hazards=(), gates=())) == signed.content
+
+
 def content_of(of: Baseline) -> str:
-    """SHA-256 of everything that a signature covers: verdict, requirements, evidence, assumptions, deficits."""
+    """SHA-256 of everything that a signature covers: verdict, requirements, evidence, assumptions, deficits, hazards,
+    gates."""
+    later = {"hazards": list(map(list, of.hazards)), "gates": list(map(list, of.gates))} if of.gates else {}
     return sha256(
         canonical(
             {
+                **later,
                 "verdict": of.verdict,
                 "requirements": [list(item) for item in of.requirements],
                 "guarantees": [list(item[:-1]) for item in of.guarantees],
@@ -64,6 +76,8 @@ def changes(
     views: Sequence[ObligationView],
     assumptions: Sequence[Assumption],
     deficits: Sequence[Deficit],
+    hazards: Sequence[HazardView],
+    gates: Sequence[Gate],
 ) -> Changes:
     """The differences from the signed report, worst first."""
     if old is None:
@@ -73,8 +87,14 @@ def changes(
     then = {item[0]: item for item in old.guarantees}
     titles = {view.id: view.obligation.claim for view in guarantees}
     below = list(_guarantees(then, now, titles))
-    under = {r.id: [entry.words for entry in below if entry.subject in r.closure] for r in requirements}
-    shown = [replace(e, edits=tuple(under.get(e.subject, ()))) for e in _requirements(old, requirements)] + below
+    asked = {r.id: (r.meaning, r.level, r.formal, r.closure) for r in requirements}
+    feared = {f"hazard {h.hazard.id}": (h.meaning, h.level, h.meaning, h.closure) for h in hazards}
+    before = {name: (meaning, level, formal) for name, meaning, level, formal in old.requirements}
+    before |= {f"hazard {name}": (meaning, level, meaning) for name, meaning, level in old.hazards}
+    named = asked | feared if old.gates else asked
+    under = {name: tuple(e.words for e in below if e.subject in item[3]) for name, item in named.items()}
+    shown = [replace(entry, edits=under.get(entry.subject, ())) for entry in _levels(before, named)]
+    shown += [*(_gates(old, gates) if old.gates else ()), *below]
     lost = any(entry.kind in ("open", "gone", "weaker") for entry in shown)
     entries = [*shown, *_assumptions(old, assumptions), *_deficits(old, deficits)]
     if lost:  # a smaller claim also has fewer assumptions and deficits: that is no gain
@@ -109,25 +129,37 @@ def _mark(record: Evidence, hash_: str) -> str:
     return f"{record.method} {record.run} {hash_}"
 
 
-def _requirements(old: Baseline, requirements: Sequence[RequirementView]) -> Iterator[ChangeLine]:
-    then = {item[0]: item for item in old.requirements}
-    for r in requirements:
-        if r.id not in then:
-            kind = "open" if not r.level.holds else "new"
-            yield ChangeLine(kind, r.id, f"{r.id} is new, and {r.level}", "", r.level.value)
+def _levels(
+    then: Mapping[str, tuple[str, str, str]], now: Mapping[str, tuple[str, Level, str, Sequence[str]]]
+) -> Iterator[ChangeLine]:
+    """Requirements and hazards: (meaning, level, formula) of each."""
+    for name, (meaning, level, formula, _) in now.items():
+        if name not in then:
+            kind = "new" if level.holds else "open"
+            yield ChangeLine(kind, name, f"{name} is new, and {level}", "", level.value)
             continue
-        _, meaning, how, formula = then[r.id]
+        old_meaning, how, old_formula = then[name]
         was = Level(how)
-        if _RANK[r.level] < _RANK[was]:
-            kind = "open" if not r.level.holds else "weaker"
-            yield ChangeLine(kind, r.id, f"{r.id} was {was}, and is {r.level}", was.value, r.level.value)
-        elif _RANK[r.level] > _RANK[was]:
-            yield ChangeLine("better", r.id, f"{r.id} was {was}, and is {r.level}", was.value, r.level.value)
-        if meaning != r.meaning:
-            yield ChangeLine("meaning", r.id, _edit(r.id, formula, r.formal), formula, r.formal)
-    for name in then:
-        if name not in {r.id for r in requirements}:
-            yield ChangeLine("gone", name, f"{name} is not claimed any more", then[name][2], "")
+        if level is not was:
+            kind = "better" if _RANK[level] > _RANK[was] else "weaker" if level.holds else "open"
+            yield ChangeLine(kind, name, f"{name} was {was}, and is {level}", was.value, level.value)
+        if meaning != old_meaning:
+            yield ChangeLine("meaning", name, _edit(name, old_formula, formula), old_formula, formula)
+    for name in (name for name in then if name not in now):
+        yield ChangeLine("gone", name, f"{name} is not there any more", then[name][1], "")
+
+
+def _gates(old: Baseline, gates: Sequence[Gate]) -> Iterator[ChangeLine]:
+    """The gates that were asked or are."""
+    word = {None: "", True: "passes", False: "fails"}
+    then = {name: (title, passed) for name, title, passed in old.gates}
+    now = {gate.id: (gate.title, gate.passed) for gate in gates if not gate.idle}
+    for name, (title, _) in (then | now).items():
+        was, is_ = (found.get(name, ("", None))[1] for found in (then, now))
+        if is_ is not was:
+            kind = "gone" if is_ is None else "open" if not is_ else "new" if was is None else "better"
+            text = f"gate “{title}”: {word[was] or 'not asked'} → {word[is_] or 'not asked any more'}"
+            yield ChangeLine(kind, name, text, word[was], word[is_])
 
 
 def _guarantees(

@@ -141,7 +141,11 @@ def of_case(case: Case) -> Snapshot:
         },
         {g.title: g.reason for g in case.gates},
         {s.key: f"{s.words}{' (expired)' if s.expired else ''}" for s in case.assumptions if not s.general},
-        {r.id: Required(r.words, r.level, r.meaning, r.formal, r.closure, r.span) for r in case.requirements},
+        {r.id: Required(r.words, r.level, r.meaning, r.formal, r.closure, r.span) for r in case.requirements}
+        | {
+            f"hazard {h.hazard.id}": Required(h.hazard.text, h.level, h.meaning, h.meaning, h.closure)
+            for h in case.hazards
+        },
         {source.path: source.text for source in case.sources},
     )
 
@@ -151,11 +155,15 @@ def of_signature(name: str, signed: Baseline) -> Snapshot:
     return Snapshot(
         name,
         {claim: (digest, Status(status)) for claim, digest, status, _, _ in signed.guarantees},
-        {},
+        {title: passed for _, title, passed in signed.gates},
         {claim: ClaimFacts(formula=formula) for claim, _, _, formula, _ in signed.guarantees},
         {},
         {key: words for key, words, _ in signed.assumptions if key not in GENERAL},
-        {name: Required(name, Level(level), meaning, formal) for name, meaning, level, formal in signed.requirements},
+        {name: Required(name, Level(level), meaning, formal) for name, meaning, level, formal in signed.requirements}
+        | {
+            f"hazard {name}": Required(meaning, Level(level), meaning, meaning)
+            for name, meaning, level in signed.hazards
+        },
         signed=True,
     )
 
@@ -228,7 +236,7 @@ def _requirements(old: Snapshot, new: Snapshot, changes: Sequence[Change]) -> It
         moved = [c for c in moved if c.kind != "meaning" or c.is_worse or "/guarantee/" in c.subject]
         if not moved and was and now and (was.level, was.meaning) == (now.level, now.meaning):
             continue
-        why = ["its sentence, formula or support is another"] if was and now and was.meaning != now.meaning else []
+        why = ["its text, formula or support is another"] if was and now and was.meaning != now.meaning else []
         why += [text for owners, text in edits if not owners or owners & {*reached, name}]
         why += [f"{short(change.subject)}: {_move(change)}" for change in moved]
         before, after = was.level if was else "", now.level if now else ""

@@ -11,7 +11,6 @@ from operator import attrgetter
 from avow.assurance.answers import (
     Answers,
     Assumption,
-    Baseline,
     Changes,
     Deficit,
     Failure,
@@ -23,7 +22,7 @@ from avow.assurance.answers import (
     TrustLine,
     WeakestEvidence,
 )
-from avow.assurance.changes import MARKS, baseline_of
+from avow.assurance.changes import MARKS, is_signed
 from avow.assurance.deficits import briefly, of_deficits
 from avow.assurance.model import Case, Gate, NodeView, ObligationView, RequirementView
 from avow.assurance.naming import cut
@@ -339,14 +338,14 @@ def _changed(changes: Changes) -> tuple[tuple[str, str], ...]:
 
 def with_signature(case: Case) -> Answers:
     """The answers, with the signature line: the signer, and whether the case is still the signed one."""
-    return replace(case.answers, signed=_signed(case.baseline, baseline_of(case).content, case.today))
+    return replace(case.answers, signed=_signed(case))
 
 
-def _signed(baseline: Baseline | None, content: str, today: str) -> str:
-    if baseline is None:
+def _signed(case: Case) -> str:
+    if (baseline := case.baseline) is None:
         return "not signed"
-    same = baseline.content == content
-    if same and baseline.until and baseline.until < today:
+    same = is_signed(case, baseline)
+    if same and baseline.until and baseline.until < case.today:
         return f"not signed; what {baseline.who} signed on {baseline.signed_on} stood until {baseline.until}"
     until = f" until {baseline.until}" if baseline.until else ""
     if same:

@@ -42,6 +42,13 @@ class HazardView:
         return min(self.mitigations, key=lambda m: WORST_FIRST.index(m.level), default=None)
 
     @property
+    def meaning(self) -> str:
+        """What a plan says of it, in a line: another line is another hazard, or one judged otherwise."""
+        h = self.hazard
+        judged = " ".join(filter(None, (h.severity, h.exposure)))
+        return f"{h.text} ({judged}; mitigated by {', '.join(h.mitigated_by) or 'nothing'})"
+
+    @property
     def stands(self) -> str:
         """Its level, in a phrase."""
         weakest = self.weakest

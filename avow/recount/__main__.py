@@ -12,7 +12,7 @@ def main(folders: list[str]) -> int:
     for folder in folders:
         try:
             found = recount(Path(folder))
-        except (OSError, ValueError) as error:
+        except (OSError, ValueError, LookupError) as error:
             print(f"{folder}: cannot be read: {error}", file=sys.stderr)
             return 2
         print(*(f"{folder}: {line}" for line in found or ["every number is borne out"]), sep="\n")

@@ -146,7 +146,8 @@ class Facts:
             ),
             "underrated": sum(
                 any(
-                    _id(v) in h["closure"] and v["criticality"] in _BELOW[h["hazard"]["severity"]] for h in self.hazards
+                    _id(v) in h.get("closure", ()) and v["criticality"] in _BELOW[h["hazard"]["severity"]]
+                    for h in self.hazards
                 )
                 for v in within
             ),

@@ -14,9 +14,21 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from assurance.sample import TODAY, case, evidence, guarantee, node_plan, obligation, rover_case, system
-from avow.assurance.answers import ABOUT, MEANINGS, PLATFORM, REACTION, START, TOOLS, Assumption, Level, Sort, Tone
+from avow.assurance.answers import (
+    ABOUT,
+    MEANINGS,
+    PLATFORM,
+    REACTION,
+    START,
+    TOOLS,
+    Assumption,
+    Baseline,
+    Level,
+    Sort,
+    Tone,
+)
 from avow.assurance.case import as_of, conclude_again
-from avow.assurance.changes import KINDS, _edit, baseline_of
+from avow.assurance.changes import KINDS, _edit, baseline_of, content_of
 from avow.assurance.deficits import _WORDS
 from avow.assurance.deficits import words_of as deficit_words
 from avow.assurance.first_screen import WARNED, _lines, _owners
@@ -569,3 +581,28 @@ def test_first_values_that_the_plan_gives_are_assumed(used: list[str]) -> None:
     subject = system({"n": ["g"]}, requirements=[needs])
     found = case(subject, [guarantee("n", "g"), start], [evidence("n.g"), begun])
     assert any(a.key == START for a in found.assumptions) == ("initial n.s" in used)
+
+
+def test_hazards_and_gates_that_changed_since_the_signature_have_a_line_each() -> None:
+    """A refutation, then a hazard judged less severe and a policy that asks less."""
+    text, by = "It burns", (f"{GUARANTEES[0].node}.{GUARANTEES[0].name}",)
+    fire, smoke = Hazard("H1", text, "critical", mitigated_by=by), Hazard("H2", text, "critical", mitigated_by=by)
+    whole = subject(PROSE, hazards=(fire, smoke))
+    first = [evidence(g) for g in GUARANTEES]
+    signed = baseline_of(case(whole, GUARANTEES, first), "f", "A", "2026-11-20", "2027-11-20")
+
+    def lines(subject: System, records: list[Evidence], signed: Baseline = signed) -> set[tuple[str, str]]:
+        return {(e.kind, e.words) for e in case(subject, GUARANTEES, records, baseline=signed).changes.entries}
+
+    assert lines(whole, first) == set()
+    found = lines(whole, [evidence(GUARANTEES[0], Verdict.REFUTED), *first[1:]])
+    assert ("open", "hazard H1 was shown of models, and is refuted") in found
+    assert ("open", "gate “Every hazard has mitigations, and all of them hold”: passes → fails") in found
+    found = lines(subject(PROSE, hazards=[replace(fire, severity="marginal")], policy="reproduction"), first)
+    assert ("meaning", "hazard H1 was “It burns (critical;”, is “It burns (marginal;”") in found
+    assert ("gone", "hazard H2 is not there any more") in found
+    assert any(kind == "gone" and words.endswith("passes → not asked any more") for kind, words in found)
+    earlier = replace(signed, hazards=(), gates=())
+    earlier = replace(earlier, content=content_of(earlier))
+    assert lines(whole, first, earlier) == set()
+    assert case(whole, GUARANTEES, first, baseline=earlier).answers.signed.startswith("signed by A")

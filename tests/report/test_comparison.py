@@ -178,7 +178,7 @@ def test_requirements_that_came_and_went_and_how_each_stands() -> None:
     assert (new.text, new.is_worse) == ("H: new → argued", False)
     said = replace(before.requirements["G"], meaning="0", words="It is quick.")
     (other,) = compare(before, replace(before, requirements={**before.requirements, "G": said}))
-    assert (other.text, other.why) == ("G: still argued", ("its sentence, formula or support is another",))
+    assert (other.text, other.why) == ("G: still argued", ("its text, formula or support is another",))
 
 
 def test_a_gate_that_needs_a_run_is_not_compared_with_a_conclusion_without_one() -> None:
