@@ -36,10 +36,12 @@ class HazardView:
     tone: Tone
     closure: tuple[str, ...] = field(default=(), metadata=LATER)
     """Every obligation that its mitigations rest on."""
+    least: str = field(default="", metadata=LATER)
+    """Of several mitigations of its level, the one on the weakest evidence."""
 
     @property
     def weakest(self) -> Mitigation | None:
-        return min(self.mitigations, key=lambda m: WORST_FIRST.index(m.level), default=None)
+        return min(self.mitigations, key=lambda m: (WORST_FIRST.index(m.level), m.name != self.least), default=None)
 
     @property
     def meaning(self) -> str:

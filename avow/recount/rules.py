@@ -139,7 +139,8 @@ def _hazard(facts: Facts, match: re.Match[str], _block: Block) -> _Numbers:
     if hazard is None:
         return None
     least = [m["name"] for m in hazard["mitigations"] if m["level"] == hazard["level"]]
-    return hazard["hazard"]["id"], match[2], least[0], ", ".join(hazard["hazard"]["mitigated_by"])
+    shown = match[3] if match[3] in least else least[0]
+    return hazard["hazard"]["id"], match[2], shown, ", ".join(hazard["hazard"]["mitigated_by"])
 
 
 def _dangers(facts: Facts, match: re.Match[str], _block: Block) -> _Numbers:

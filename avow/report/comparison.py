@@ -13,11 +13,7 @@ from avow.evidence.status import Status
 from avow.report.page import asset, environment
 
 _KINDS = {
-    "requirement": (
-        "Requirements and hazards: what each was, what it is, and which edit",
-        "requirements or hazards changed",
-        "",
-    ),
+    "requirement": ("Requirements and hazards: what each was and is, and the edit", "requirements and hazards", ""),
     "gate": ("Gates of the policy", "of the gates changed", ""),
     "worse": ("Lost: claims that stand worse", "worse", "bad"),
     "removed": ("Gone: claims that are not made any more", "gone", "open"),

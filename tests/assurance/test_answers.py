@@ -553,6 +553,12 @@ def test_requirements_on_another_guarantee_of_the_weakest_node_are_counted_besid
         system({"a": ["g", "h"]}, requirements=asked, hazards=[replace(danger, severity="marginal")]), node, made
     )
     assert "underrated" not in {d.key for d in spilt.deficits}
+    named = ("a.h", "R2", "a.g", "R1")
+    orders = [replace(danger, mitigated_by=names) for names in (named, ("a.h", "a.g"), ("R2", "R1"))]
+    for view in case(system({"a": ["g", "h"]}, requirements=asked, hazards=orders), node, made).hazards:
+        assert view.weakest is not None
+        assert set(view.weakest.claims) in ({node[0].id}, set())
+        assert view.weakest.name in ("a.g", "R1"), "as the weakest evidence of the whole case"
     assert whole.answers.verdict == "Argued (no overall failure rate)"
     alone = case(system({"a": ["g"]}, requirements=asked[:1]), node[:1], made[:1]).answers.weakest
     assert alone is not None
