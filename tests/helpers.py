@@ -18,6 +18,8 @@ from unittest import mock
 import pytest
 from _pytest.mark import ParameterSet
 
+from avow.assurance.model import Case
+from avow.base.workspace import WRITTEN_ON_DEMAND
 from avow.cli import main
 
 
@@ -28,6 +30,17 @@ def edit(path: Path, *pairs: tuple[str, str]) -> None:
         assert old in text, old
         text = text.replace(old, new)
     path.write_text(text, encoding="utf-8")
+
+
+def every_text(case: Case) -> Iterator[tuple[str, str]]:
+    """Every format of a report except the PDF, whenever it is written, by its file name."""
+    from avow.report import formats
+    from avow.report.on_demand import rendered
+
+    yield from formats(case)
+    for name in WRITTEN_ON_DEMAND:
+        if name != "report.pdf":
+            yield name, rendered(case, name).decode()
 
 
 @functools.cache

@@ -3,12 +3,24 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.records import dataclass
 from avow.base.suggestions import suggest
+
+_ON_DEMAND = {
+    "gsn": ("gsn.yaml", "gsn.svg"),
+    "pdf": ("report.pdf",),
+    "qualification": ("qualification.html",),
+    "sacm": ("sacm.xml",),
+    "sarif": ("report.sarif",),
+    "traceability": ("traceability.html", "traceability.csv", "traceability.reqif"),
+}
+WRITTEN_ON_DEMAND = tuple(name for names in _ON_DEMAND.values() for name in names)
+ON_DEMAND: Mapping[str, tuple[str, ...]] = {**_ON_DEMAND, "all": WRITTEN_ON_DEMAND}
+"""The formats of a report that only `avow report --format` writes, with their files."""
 
 
 @dataclass(frozen=True, slots=True)

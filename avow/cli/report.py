@@ -9,14 +9,14 @@ import click
 
 from avow.assurance.codec import read_case
 from avow.base.codec import document
-from avow.base.workspace import find_workspace, report_folder, require_systems, workspace
+from avow.base.workspace import ON_DEMAND, find_workspace, report_folder, require_systems, workspace
 from avow.cli.options import PathArgument, json_option
 from avow.evidence.ledger import Ledger
 from avow.pipeline.report_check import check, stale
 from avow.pipeline.settings import sign_with
 from avow.pipeline.state import task_name
 from avow.pipeline.tasks import execute
-from avow.report.pdf import write_pdf
+from avow.report.on_demand import export
 
 
 @click.command()
@@ -28,10 +28,16 @@ from avow.report.pdf import write_pdf
     metavar="REPORT",
     help="Does the report of this system, or in this folder, say what the ledger says?",
 )
-@click.option("--pdf", is_flag=True, help="Write report.pdf as well.")
+@click.option(
+    "--format",
+    "names",
+    type=click.Choice(list(ON_DEMAND)),
+    multiple=True,
+    help="Write this format as well; repeatable. A later run with another result removes its files.",
+)
 @click.option("--key", type=PathArgument(exists=True, dir_okay=False), help="Sign the attestations (AVOW_KEY).")
 @json_option()
-def command(systems: tuple[str, ...], folder: Path | None, pdf: bool, key: object, as_json: bool) -> int:
+def command(systems: tuple[str, ...], folder: Path | None, names: tuple[str, ...], key: object, as_json: bool) -> int:
     """Render the report of each SYSTEM (its name or folder; else all) from its ledger; nothing is verified.
 
     With --check REPORT nothing is written: every record that the report quotes is looked up in the ledger, every
@@ -45,10 +51,10 @@ def command(systems: tuple[str, ...], folder: Path | None, pdf: bool, key: objec
     sign_with(key)
     wanted = [f"report:{task_name(name)}" for name in systems] or ["report"]
     code = execute(place.root, wanted, answer=sys.stdout if as_json else None)
-    if pdf and code == 0:
-        for folder in sorted({path.parent for path in place.reports.glob("*/report.json")}):
-            if not systems or folder.name in systems:
-                print(place.relative(write_pdf(read_case(folder), folder)), file=sys.stderr)
+    for folder in sorted({path.parent for path in place.reports.glob("*/report.json")}) if names and code == 0 else ():
+        if not systems or folder.name in systems:
+            for path in export(read_case(folder), folder, names):
+                print(place.relative(path), file=sys.stderr)
     return code
 
 

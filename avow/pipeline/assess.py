@@ -49,7 +49,7 @@ from avow.pipeline.settings import EXPLAIN, asked_seconds, signing_key
 from avow.pipeline.state import State
 from avow.pipeline.workload import LISTED, Survey, write_obligations
 from avow.report import render_all, write_index
-from avow.report.page import environment
+from avow.report.page import fill
 from avow.report.short import terminal_lines
 from avow.system.folding import seen
 from avow.system.graph import dataflow
@@ -350,7 +350,7 @@ def mark_earlier(state: State) -> None:
 
 def _mark_pages(folder: Path) -> None:
     """If report.json is damaged, the pages that a person opens are marked as they are."""
-    mark = environment().get_template("earlier.html.j2").render()
+    mark = fill("earlier.html.j2")
     for page in sorted(folder.glob("*.html")):
         before, body, after = read_text(page, "utf-8", errors="replace").partition("<body>")
         if body and not after.lstrip().startswith(mark):

@@ -24,6 +24,7 @@ from avow.base.codec import Unreadable
 from avow.base.diagnostics import Rejected
 from avow.base.files import digest_file, read_regular, sha256
 from avow.base.tuning.shown import DIFF_REASONS
+from avow.base.workspace import WRITTEN_ON_DEMAND
 from avow.calculus.certificates import Certificates
 from avow.calculus.composition import compose
 from avow.calculus.obligations import reestablished
@@ -33,8 +34,8 @@ from avow.evidence.ledger import Ledger
 from avow.kernel.certificate import Certificate
 from avow.pipeline.work import engine_works
 from avow.recount import recount
-from avow.report import ATTESTATION, PDF, formats, left_over
-from avow.report.pdf import render_pdf
+from avow.report import ATTESTATION, formats, left_over
+from avow.report.on_demand import rendered
 from avow.solving.apart import Both
 from avow.system.load import PLAN_FILE, load_system
 
@@ -173,12 +174,12 @@ def _formats(case: Case, folder: Path, keys: Sequence[Path]) -> Iterable[str]:
             continue
         if not same:
             yield f"{name} is not what the case in report.json renders to"
-    if (path := folder / PDF).exists():
+    for name in (name for name in WRITTEN_ON_DEMAND if (folder / name).exists()):
         try:
-            if read_regular(path) != render_pdf(case):
-                yield f"{PDF} is not what the case in report.json renders to"
+            if read_regular(folder / name) != rendered(case, name):
+                yield f"{name} is not what the case in report.json renders to"
         except (OSError, Rejected) as error:
-            yield f"{PDF} cannot be compared here: {error}"
+            yield f"{name} cannot be compared here: {error}"
 
 
 def _recounted(folder: Path) -> Iterable[str]:

@@ -26,7 +26,7 @@ from avow.base.notes import read_note, write_note
 from avow.base.records import dataclass
 from avow.base.tools import LIBRARIES, package_digest, program_files
 from avow.base.tuning.running import TICK_SECONDS
-from avow.base.workspace import Workspace
+from avow.base.workspace import WRITTEN_ON_DEMAND, Workspace
 from avow.isolation.level import SANDBOX
 from avow.isolation.observed import Observed, Seen, look, marks
 from avow.pipeline.results import Result
@@ -35,7 +35,7 @@ from avow.pipeline.settings import EXPLAIN, FRESH, KEY, ON, SECONDS, signing_key
 _ENVIRONMENT = ("PATH", "PYTHONPATH", "AJPF_HOME", "AVOW_AJPF_JAVA", "HOME", EXPLAIN, FRESH, SANDBOX, ON, SECONDS, KEY)
 _CODE = tuple(Path(place) for package in (avow, avow.backends) for place in package.__path__)
 """Avow's own code, wherever it is installed."""
-_OURS = (".doit.json", ".lock", ".settled.json", "report.pdf")
+_OURS = (".doit.json", ".lock", ".settled.json", *WRITTEN_ON_DEMAND)
 """Excluded among the artifacts: doit's own memory and our locks, which change with every run, and files written on
 demand."""
 _PACKAGES = (*LIBRARIES, "hypothesis", "rosbags")

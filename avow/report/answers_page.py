@@ -23,7 +23,7 @@ from avow.report import wording
 from avow.report.bowtie import bowtie
 from avow.report.goals import doubts
 from avow.report.modules import NodeModule, RequirementModule, conditions, node_modules, requirement_modules
-from avow.report.page import asset, environment, known_pages, svg_image
+from avow.report.page import fill, known_pages, svg_image
 
 _ORDER = (Tone.RED, Tone.AMBER, Tone.GREEN, Tone.GREY)
 WORDS = (
@@ -82,18 +82,13 @@ def render_argument(case: Case, json_digest: str = "") -> str:
 
 
 def _render(template: str, case: Case, json_digest: str, **more: Any) -> str:
-    return (
-        environment()
-        .get_template(template)
-        .render(
-            case=case,
-            style=Markup(asset("answers.css")),
-            script=Markup(asset("answers.js")),
-            known=known_pages(case),
-            titles={node.name for node in case.nodes},
-            json_digest=json_digest,
-            **more,
-        )
+    return fill(
+        template,
+        case=case,
+        known=known_pages(case),
+        titles={node.name for node in case.nodes},
+        json_digest=json_digest,
+        **more,
     )
 
 
@@ -183,16 +178,12 @@ def render_index(cases: Sequence[Case], earlier: Sequence[str] = ()) -> str:
     if earlier:
         line += f"; {count(len(earlier), 'report')} as of an earlier state"
         tone = Tone.AMBER if tone is Tone.GREEN else tone
-    return (
-        environment()
-        .get_template("systems.html.j2")
-        .render(
-            rows=[(case, case.history.points) for case in ranked],
-            earlier=earlier,
-            titles=Counter(case.title for case in cases),
-            line=line,
-            tone=tone,
-            style=Markup(asset("answers.css")),
-            quote=quote,
-        )
+    return fill(
+        "systems.html.j2",
+        rows=[(case, case.history.points) for case in ranked],
+        earlier=earlier,
+        titles=Counter(case.title for case in cases),
+        line=line,
+        tone=tone,
+        quote=quote,
     )

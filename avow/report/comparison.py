@@ -5,12 +5,10 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 
-from markupsafe import Markup
-
 from avow.assurance.compare import ORDER, Change
 from avow.base.tuning.shown import CHANGES_UNFOLDED
 from avow.evidence.status import Status
-from avow.report.page import asset, environment
+from avow.report.page import fill
 
 _KINDS = {
     "requirement": ("Requirements and hazards: what each was and is, and the edit", "requirements and hazards", ""),
@@ -35,21 +33,17 @@ def render_comparison(old: str, new: str, changes: Sequence[tuple[str, Change]])
         systems[system] = [(kind, [c for c in mine if c.kind == kind]) for kind in ORDER]
     counts = Counter(change.kind for _, change in changes)
     lost = sum(c.is_worse and c.kind != "removed" for _, c in changes)
-    return (
-        environment()
-        .get_template("compare.html.j2")
-        .render(
-            old=old,
-            new=new,
-            line=_line(counts, lost),
-            banner="bad" if lost else "open" if counts["removed"] or counts["meaning"] else "good",
-            systems=systems,
-            counts=[(kind, counts[kind], _KINDS[kind][1], _tone(kind, changes)) for kind in ORDER if counts[kind]],
-            headings={kind: heading for kind, (heading, _, _) in _KINDS.items()},
-            known={status.value for status in Status},
-            folded=CHANGES_UNFOLDED,
-            style=Markup(asset("style.css")),  # our own file
-        )
+    return fill(
+        "compare.html.j2",
+        old=old,
+        new=new,
+        line=_line(counts, lost),
+        banner="bad" if lost else "open" if counts["removed"] or counts["meaning"] else "good",
+        systems=systems,
+        counts=[(kind, counts[kind], _KINDS[kind][1], _tone(kind, changes)) for kind in ORDER if counts[kind]],
+        headings={kind: heading for kind, (heading, _, _) in _KINDS.items()},
+        known={status.value for status in Status},
+        folded=CHANGES_UNFOLDED,
     )
 
 

@@ -86,6 +86,7 @@ def environment() -> Environment:
         "Status": Status,
         "Tone": Tone,
         "anchor": wording.anchor,
+        "asset": asset,
         "page_of": wording.page_of,
         "ticks": _ticks,
         "bound_text": wording.bound_text,
@@ -115,6 +116,11 @@ def environment() -> Environment:
         "weigh": weigh,
     }
     return found
+
+
+def fill(template: str, **given: Any) -> str:
+    """The text of a template."""
+    return environment().get_template(template).render(given)
 
 
 def render_page(case: Case, json_digest: str = "") -> str:
@@ -171,17 +177,7 @@ def render_details(case: Case) -> Iterator[tuple[str, str]]:
 
 
 def _fill(template: str, case: Case, **more: Any) -> str:
-    return (
-        environment()
-        .get_template(template)
-        .render(
-            case=case,
-            known=known_pages(case),
-            style=Markup(asset("style.css")),  # Avow's own files, in the package
-            script=Markup(asset("script.js")),
-            **more,
-        )
-    )
+    return fill(template, case=case, known=known_pages(case), **more)
 
 
 @by_identity(1)
@@ -253,21 +249,17 @@ def render_traceability(case: Case, rows: Sequence[Row]) -> str:
     guarantees = {view.id for view in case.guarantees}
     serving = {row.obligation for row in rows if row.requirement and row.obligation in guarantees}
     reached = {row.requirement for row in rows if row.requirement and row.evidence}
-    return (
-        environment()
-        .get_template("traceability.html.j2")
-        .render(
-            case=case,
-            orphans=_by_claim([row for row in rows if row.remark]),
-            paths={r.id: _by_claim([row for row in rows if row.requirement == r.id]) for r in case.requirements},
-            others=_by_claim([row for row in rows if not row.requirement]),
-            reached=len(reached),
-            guarantees=len(guarantees),
-            serving=len(serving),
-            known={view.id for view in case.obligations},
-            total=len(rows),
-            style=Markup(asset("style.css")),
-        )
+    return fill(
+        "traceability.html.j2",
+        case=case,
+        orphans=_by_claim([row for row in rows if row.remark]),
+        paths={r.id: _by_claim([row for row in rows if row.requirement == r.id]) for r in case.requirements},
+        others=_by_claim([row for row in rows if not row.requirement]),
+        reached=len(reached),
+        guarantees=len(guarantees),
+        serving=len(serving),
+        known={view.id for view in case.obligations},
+        total=len(rows),
     )
 
 
@@ -281,9 +273,9 @@ def _by_claim(rows: Sequence[Row]) -> list[tuple[Row, list[Row]]]:
 
 
 @cache
-def asset(name: str) -> str:
-    """The text of a file beside the templates."""
-    return resources.files("avow.report").joinpath("templates", name).read_text(encoding="utf-8")
+def asset(name: str) -> Markup:
+    """The text of a file of Avow's own beside the templates."""
+    return Markup(resources.files("avow.report").joinpath("templates", name).read_text(encoding="utf-8"))
 
 
 def _reading_order(case: Case) -> Any:

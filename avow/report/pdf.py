@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 from importlib import resources
 from itertools import chain
-from pathlib import Path
 from typing import Any
 
 from avow.assurance.answers import Assumption, SupposedLine
@@ -15,13 +14,12 @@ from avow.assurance.naming import short
 from avow.assurance.remarks import REMARK
 from avow.backend_kit.timeline import in_words, picture, timelines
 from avow.base.diagnostics import Diagnostic, Rejected
-from avow.base.files import write
 from avow.base.plain import listed
 from avow.base.tuning.shown import CONTRACT_LINES, PDF_COLUMNS, PDF_OBLIGATIONS
 from avow.base.verdict import Counterexample
 from avow.evidence.obligation import SYSTEM_LEVEL, Kind
 from avow.evidence.status import Status
-from avow.report import PDF, example
+from avow.report import example
 from avow.report.answers_page import full_reason, others, worded
 from avow.report.maps import map_picture
 from avow.report.modules import RequirementModule, requirement_modules
@@ -65,13 +63,6 @@ def render_pdf(case: Case) -> bytes:
         said = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise Rejected(Diagnostic("CLI023", f"typst fails: {said}")) from error
     return data
-
-
-def write_pdf(case: Case, folder: Path) -> Path:
-    """Write `folder`/report.pdf. Raises OSError, and Rejected as `render_pdf`."""
-    path = folder / PDF
-    write(path, render_pdf(case))
-    return path
 
 
 def _data(case: Case) -> dict[str, Any]:

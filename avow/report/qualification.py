@@ -7,8 +7,6 @@ from __future__ import annotations
 
 from collections import Counter
 
-from markupsafe import Markup
-
 from avow.assurance.certification import ProofGrade
 from avow.assurance.gap import independent, reviewers
 from avow.assurance.model import Case, ObligationView
@@ -17,7 +15,7 @@ from avow.base.persons import one_person
 from avow.base.records import dataclass
 from avow.base.verdict import Link
 from avow.evidence.status import weigh
-from avow.report.page import asset, environment
+from avow.report.page import fill
 
 DATA = "qualification.yaml"
 """The file that is kept by hand."""
@@ -57,17 +55,13 @@ def render_qualification(case: Case) -> str:
     """The page. Deterministic: same case, same bytes."""
     backends = {backend for node in case.nodes for _, backend in node.methods}
     grades = Counter(proof.grade for proof in case.proofs)
-    return (
-        environment()
-        .get_template("qualification.html.j2")
-        .render(
-            case=case,
-            data=packaged("avow.report", DATA),
-            used=[m for m in case.methods if m.name in backends],
-            backends=backends,
-            grades=[(grade, grades[grade]) for grade in ProofGrade],
-            rows=[independence(view) for view in case.guarantees],
-            scored=[(view, r) for view in case.guarantees for r in view.records if "mutation" in r.details],
-            style=Markup(asset("style.css")),
-        )
+    return fill(
+        "qualification.html.j2",
+        case=case,
+        data=packaged("avow.report", DATA),
+        used=[m for m in case.methods if m.name in backends],
+        backends=backends,
+        grades=[(grade, grades[grade]) for grade in ProofGrade],
+        rows=[independence(view) for view in case.guarantees],
+        scored=[(view, r) for view in case.guarantees for r in view.records if "mutation" in r.details],
     )

@@ -14,7 +14,7 @@ from markupsafe import Markup
 from avow.assurance.model import Case
 from avow.assurance.traceability import Row
 from avow.base.files import sha256
-from avow.report.page import environment
+from avow.report.page import fill
 from avow.report.wording import clean
 
 TEXT = "ReqIF.Text"
@@ -77,22 +77,19 @@ def render_reqif(case: Case, rows: Sequence[Row]) -> str:
     below: dict[_Name, list[_Name]] = {}
     for _, source, target in links:
         below.setdefault(source, []).append(target)
-    return (
-        environment()
-        .get_template("traceability.reqif.j2")
-        .render(
-            case=case,
-            kinds=KINDS,
-            relations=RELATIONS,
-            objects=objects,
-            links=links,
-            below=below,
-            id=lambda *parts: Markup(f'"{identifier(*parts)}"'),
-            ref=lambda *parts: Markup(identifier(*parts)),
-            q=lambda text: Markup(quoteattr(clean(text))),  # quoted as XML, with the quotation marks
-            clean=clean,
-            when=f"{case.today}T00:00:00Z",
-        )
+    return fill(
+        "traceability.reqif.j2",
+        case=case,
+        kinds=KINDS,
+        relations=RELATIONS,
+        objects=objects,
+        links=links,
+        below=below,
+        id=lambda *parts: Markup(f'"{identifier(*parts)}"'),
+        ref=lambda *parts: Markup(identifier(*parts)),
+        q=lambda text: Markup(quoteattr(clean(text))),  # quoted as XML, with the quotation marks
+        clean=clean,
+        when=f"{case.today}T00:00:00Z",
     )
 
 

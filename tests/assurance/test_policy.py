@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 import pytest
+from helpers import every_text
 
 from assurance.sample import METHODS, SPAN, TODAY, case, evidence, guarantee, node_plan, obligation, system
 from avow.assurance.answers import Level, Tone
@@ -18,7 +19,6 @@ from avow.base.verdict import Link, Object, Verdict
 from avow.evidence.obligation import Kind, Obligation
 from avow.evidence.record import ISOLATION, SIGNED_BY, SOLVER, Evidence
 from avow.evidence.status import Status
-from avow.report import formats
 from avow.system.plan import Finding, Located, Requirement
 
 
@@ -337,7 +337,7 @@ def test_a_gate_that_passes_by_excuses_says_so() -> None:
     found = case(subject, [about], [evidence(about, Verdict.REFUTED)])
     gate = next(gate for gate in found.gates if gate.id == "refuted")
     assert (gate.passed, gate.mark) == (True, "◐")
-    made = {name: str(text) for name, text in formats(found)}
+    made = {name: str(text) for name, text in every_text(found)}
     for name in ("index.html", "claims.html", "report.md"):
         assert gate.state in made[name]
     assert f"<system-out>{gate.reason}</system-out>" in made["junit.xml"]

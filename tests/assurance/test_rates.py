@@ -6,6 +6,7 @@ from dataclasses import replace
 from typing import Any
 
 import pytest
+from helpers import every_text
 
 from assurance.sample import case, evidence, guarantee, node_plan, obligation, system
 from avow.assurance.case import conclude_again
@@ -16,7 +17,6 @@ from avow.base.diagnostics import Rejected
 from avow.base.verdict import Verdict
 from avow.evidence.obligation import Kind
 from avow.evidence.record import COMPOSES, RATE, Evidence
-from avow.report import formats
 from avow.report.explained import explained
 from avow.report.short import terminal_lines
 from avow.system.plan import Requirement
@@ -175,7 +175,7 @@ SAYS_NO_STANDING = {
 
 def test_every_format_that_says_how_a_requirement_stands_says_its_rate() -> None:
     found = three(*ALL)
-    for name, content in formats(found):
+    for name, content in every_text(found):
         if isinstance(content, str) and name not in SAYS_NO_STANDING and not name.startswith("node-"):
             rate = '"bound": "0.258"' if name == "report.json" else "at most 25.8 % of steps fail, at 85 % confidence"
             plain = " ".join(content.replace("\\%", "%").replace("\\", "").replace("&nbsp;", " ").split())

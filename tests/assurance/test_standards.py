@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from helpers import every_text
 
 from assurance.sample import case, evidence, guarantee, node_plan, obligation, system
 from avow.assurance.answers import Sort
@@ -17,7 +18,6 @@ from avow.assurance.standards import Queries, State, standards
 from avow.base.packaged import packaged
 from avow.base.verdict import Object, Verdict
 from avow.evidence.obligation import Kind, ProgramClaim
-from avow.report import formats
 from avow.system.plan import Requirement
 
 PAGE = Path(__file__).parents[2] / "docs/standards.md"
@@ -45,7 +45,7 @@ def test_a_policy_that_names_a_standard_has_a_gate_and_a_table() -> None:
     assert not gate.passed
     assert "A-3.4: requirements without a formula: R" in gate.reason
     assert gate.suggestions
-    page = dict(formats(found))["index.html"]
+    page = dict(every_text(found))["index.html"]
     assert all(
         word in page
         for word in ("A-3.4", "Avow is not qualified", found.standard.counts, found.standard.selection[:60])

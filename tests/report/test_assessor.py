@@ -12,13 +12,14 @@ from xml.etree import ElementTree
 
 import pytest
 from assurance.sample import case, evidence, guarantee, node_plan, obligation, rover_case, system
+from helpers import every_text
 
 from avow.assurance.model import Case
 from avow.assurance.remarks import REMARK
 from avow.base.verdict import Verdict
 from avow.evidence.obligation import Kind
 from avow.evidence.status import Status
-from avow.report import formats, gsn_svg, wording
+from avow.report import gsn_svg, wording
 from avow.report.answers_page import render_index
 from avow.report.page import asset
 from avow.report.pdf import _data as pdf_data
@@ -34,7 +35,7 @@ SUBJECT = system(
 
 def texts(found: Case) -> dict[str, str]:
     """The formats that are text, but the PDF's data in place of the PDF."""
-    made = {name: content for name, content in formats(found) if isinstance(content, str)}
+    made = {name: content for name, content in every_text(found) if isinstance(content, str)}
     return made | {"pdf": json.dumps(pdf_data(found))}
 
 

@@ -10,11 +10,12 @@ from typing import Any
 
 import pytest
 from assurance.sample import case, rover_parts
+from helpers import every_text
 
 from avow.evidence.ledger import Ledger
 from avow.pipeline import report_check as module
 from avow.pipeline.report_check import check
-from avow.report import formats, render_all
+from avow.report import render_all
 
 
 @pytest.fixture(scope="module")
@@ -87,7 +88,7 @@ def hunt(place: Path, times: int, monkeypatch: pytest.MonkeyPatch) -> list[str]:
         mark = repr(found)
         if mark not in rendered:
             rendered.clear()
-            rendered[mark] = list(formats(found))
+            rendered[mark] = list(every_text(found))
         return rendered[mark]
 
     monkeypatch.setattr(module, "formats", once)

@@ -12,12 +12,11 @@ from pathlib import Path
 import pytest
 import yaml
 from assurance.sample import case, evidence, rover_parts
-from helpers import avow, some
+from helpers import avow, every_text, some
 from scale.made import programs
 
 from avow.base.verdict import Verdict
 from avow.evidence.ledger import Ledger
-from avow.report import formats
 
 _OWN = re.compile(
     r"\d{8}T\d{6}\.\d+-\d+|\d{4}-\d\d-\d\d[T ]\d\d:\d\d[\d:.+Z]*|\b_?[0-9a-f]{8,64}\b|\b(?:[Rr]ecord|no\.|#)\s*\d+"
@@ -48,7 +47,7 @@ def test_a_report_does_not_hang_on_the_order_in_which_methods_answered(seed: int
 
     def told(which: list[int]) -> Mapping[str, list[str]]:
         made = case(subject, obligations, [records[at] for at in which], keys=keys, **extras)
-        return {name: plain(found) for name, found in formats(made) if isinstance(found, str)}
+        return {name: plain(found) for name, found in every_text(made) if isinstance(found, str)}
 
     expected = told(sorted(order))
     for name, lines in told(order).items():

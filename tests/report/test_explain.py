@@ -11,6 +11,7 @@ from urllib.parse import unquote
 
 import pytest
 from assurance.sample import case, evidence, guarantee, obligation, rover_case, system
+from helpers import every_text
 from rich.console import Console
 
 from avow.assurance.answers import MEANINGS as LEVELS
@@ -23,7 +24,6 @@ from avow.cli.explain import find_claim
 from avow.evidence.ledger import Ledger
 from avow.evidence.obligation import Kind
 from avow.evidence.status import Status
-from avow.report import formats
 from avow.report.explained import explained, left_out
 from avow.report.terminal import show_obligation
 from avow.report.wording import MEANINGS
@@ -149,7 +149,7 @@ def unexplained(found: Case, made: dict[str, str]) -> set[str]:
 
 def test_every_mark_that_a_report_shows_is_known() -> None:
     found = rover_case()
-    made = {name: text for name, text in formats(found) if isinstance(text, str)}
+    made = {name: text for name, text in every_text(found) if isinstance(text, str)}
     assert len(marks(made)) > 40
     assert unexplained(found, made) == set()
 
@@ -158,7 +158,7 @@ def test_every_mark_that_a_report_shows_is_known() -> None:
 @pytest.mark.parametrize("folder", REPORTS, ids=lambda folder: folder.name)
 def test_every_mark_of_the_shipped_systems_reports_is_known(folder: Path) -> None:
     found = read_case(folder)
-    made = {name: text for name, text in formats(found) if isinstance(text, str)}
+    made = {name: text for name, text in every_text(found) if isinstance(text, str)}
     assert unexplained(found, made) == set()
 
 

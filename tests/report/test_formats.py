@@ -17,6 +17,7 @@ import junitparser
 import pytest
 import yaml
 from assurance.sample import case, evidence, guarantee, node_plan, obligation, rover_case, system
+from helpers import every_text
 
 import avow.report
 from avow.assurance.answers import EARLIER, Tone
@@ -27,12 +28,13 @@ from avow.assurance.model import Case
 from avow.assurance.traceability import COLUMNS, trace
 from avow.base.diagnostics import Rejected
 from avow.base.verdict import Verdict
+from avow.base.workspace import WRITTEN_ON_DEMAND
 from avow.evidence.obligation import Kind
 from avow.evidence.status import Status
-from avow.report import PDF, formats, goals, render_all, write_index
+from avow.report import goals, render_all, write_index
 from avow.report.exchange import render_attestation
 from avow.report.gsn import render_gsn
-from avow.report.pdf import write_pdf
+from avow.report.on_demand import export
 from avow.report.short import terminal_lines
 from avow.system.plan import Requirement, Validation
 from report.hostile import hostile_case
@@ -45,7 +47,7 @@ _RENDERED: dict[str, dict[str, Any]] = {}
 def rendered(request: pytest.FixtureRequest) -> tuple[Case, dict[str, Any]]:
     name = request.param
     if name not in _RENDERED:
-        _RENDERED[name] = dict(formats(CASES[name]()))
+        _RENDERED[name] = dict(every_text(CASES[name]()))
     return CASES[name](), _RENDERED[name]
 
 
@@ -62,8 +64,8 @@ def test_what_is_below_a_requirement_may_be_no_obligation() -> None:
     below = ("assumption:system/assumption/together(a,b):0123456789ab", "derivation:D", "requirement:R9")
     requirements = tuple(replace(r, below=below, weakest=below[0], failing=below) for r in found.requirements)
     derivations = tuple(replace(d, below=below, weakest=below[0]) for d in found.derivations)
-    texts = dict(formats(replace(found, requirements=requirements, derivations=derivations)))
-    assert texts.keys() == dict(formats(found)).keys()
+    texts = dict(every_text(replace(found, requirements=requirements, derivations=derivations)))
+    assert texts.keys() == dict(every_text(found)).keys()
     assert "system/assumption/together(a,b)" in texts["claims.html"]
 
 
@@ -102,7 +104,7 @@ def test_sarif_meets_its_schema(rendered: tuple[Case, dict[str, Any]]) -> None:
 def test_sarif_tells_where_and_what_is_accepted() -> None:
     results = {
         r["properties"]["obligation"]: r
-        for r in json.loads(dict(formats(rover_case()))["report.sarif"])["runs"][0]["results"]
+        for r in json.loads(dict(every_text(rover_case()))["report.sarif"])["runs"][0]["results"]
     }
     medium = results["rover/radiationSensor/guarantee/medium"]
     assert medium["locations"][0]["physicalLocation"]["artifactLocation"]["uri"] == "contracts/rover/system.rcl"
@@ -203,7 +205,7 @@ def test_known_bad_material_is_warned_of_in_every_format_for_machines() -> None:
     target = guarantee("n", "g")
     expected = [Finding("n/guarantee/g", "refuted", "as published")]
     subject = system({"n": ["g"]}, plans=[node_plan("n", "low", "hoare")], expected=expected, policy="reproduction")
-    texts: dict[str, Any] = dict(formats(case(subject, [target], [evidence(target, Verdict.REFUTED)])))
+    texts: dict[str, Any] = dict(every_text(case(subject, [target], [evidence(target, Verdict.REFUTED)])))
     assert '<property name="result" value="WARNED"/>' in texts["junit.xml"]
     assert json.loads(texts["report.sarif"])["runs"][0]["properties"]["result"] == "WARNED"
     assert json.loads(texts["attestation.jsonl"].splitlines()[0])["predicate"]["result"] == "WARNED"
@@ -224,17 +226,19 @@ def test_markdown_keeps_its_tables_and_shows_no_html(rendered: tuple[Case, dict[
     assert not re.search(r"(?<!\\)<[a-z/]", texts["report.md"])
 
 
-def test_a_pdf_is_written_on_demand_and_removed_with_its_state(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_files_on_demand_are_removed_with_their_state(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("typst")
     case = CASES["empty"]()
-    data = write_pdf(case, tmp_path).read_bytes()
+    written = list(export(case, tmp_path, ["all"]))
+    assert [path.name for path in written] == list(WRITTEN_ON_DEMAND)
+    data = (tmp_path / "report.pdf").read_bytes()
     assert data.startswith(b"%PDF-")
     assert b"%%EOF" in data[-32:]
     render_all(case, tmp_path)
-    assert not (tmp_path / PDF).exists()
+    assert not any(path.exists() for path in written)
     monkeypatch.setitem(sys.modules, "typst", None)
     with pytest.raises(Rejected, match="CLI023"):
-        write_pdf(case, tmp_path)
+        list(export(case, tmp_path, ["pdf"]))
 
 
 def test_rendering_twice_changes_no_byte(tmp_path: Path) -> None:
@@ -258,7 +262,7 @@ def test_the_argument_is_made_once_and_comparisons_are_sought_among_links_only(
     monkeypatch.setattr(goals, "_Argument", lambda of: (made.append(of), module(of))[1])
     claims = [guarantee("a", f"g{k}") for k in range(3)]
     found = case(system({"a": ["g0", "g1", "g2"]}), claims, [evidence(claim) for claim in claims])
-    assert {name for name, _ in formats(found)} >= {"sacm.xml", "gsn.yaml"}
+    assert {name for name, _ in every_text(found)} >= {"sacm.xml", "gsn.yaml"}
     assert made == [found]
     assert sought
     assert not any(sought), "no program was compared with a model"
@@ -327,10 +331,10 @@ def test_the_matrix_page_counts_what_is_covered() -> None:
 def test_the_grade_of_the_proofs_is_told_as_one_of_proofs() -> None:
     """Beside WARNED, or a refutation, a bare word would read as a verdict."""
     found = replace(rover_case(), grade=Grade.CERTIFIED)
-    for name, text in dict(formats(found)).items():
+    for name, text in dict(every_text(found)).items():
         assert "CERTIFIED" not in str(text), name
-    assert '"grade": "proofs certified"' in str(dict(formats(found))["report.json"])
-    assert "Proofs certified" in str(dict(formats(found))["claims.html"])
+    assert '"grade": "proofs certified"' in str(dict(every_text(found))["report.json"])
+    assert "Proofs certified" in str(dict(every_text(found))["claims.html"])
 
 
 def test_the_index_does_not_call_known_bad_material_passed() -> None:
@@ -352,7 +356,7 @@ def test_the_index_does_not_call_known_bad_material_passed() -> None:
     assert text.count("Examined, not relied upon") == 2
     assert examined.answers.verdict == "Examined, not relied upon", "one of four sentences"
     assert text.count("WARNED: 1 finding known") == 1
-    made = dict(formats(examined))
+    made = dict(every_text(examined))
     for name in ("index.html", "report.md", "comment.md", "gsn.yaml"):
         assert "WARNED: 1 finding known" in str(made[name]), name
     assert any("WARNED: 1 finding known" in line for line in terminal_lines(examined))
@@ -389,7 +393,8 @@ def test_the_trend_is_what_the_ledger_said_after_each_run() -> None:
 
 
 def test_every_format_is_described() -> None:
-    names = [re.sub(r"^node-\w+", "node-NAME", name) for name, _ in formats(rover_case())]
+    names = [re.sub(r"^node-\w+", "node-NAME", name) for name, _ in every_text(rover_case())]
+    names.append("report.pdf")
     page = (Path(__file__).parents[2] / "docs" / "reading-a-report.md").read_text(encoding="utf-8")
     table = re.findall(r"`([\w.-]+)`", "\n".join(re.findall(r"^\| (.*?) \|", page, re.MULTILINE)))
     assert set(names) <= set(table), "the table of files in docs/reading-a-report.md"
@@ -399,7 +404,7 @@ def test_every_format_is_described() -> None:
 def test_every_format_says_that_it_is_of_an_earlier_state() -> None:
     """Of a system that cannot be read any more; a PDF's text is packed."""
     for made, said in ((as_of_earlier(rover_case()), True), (rover_case(), False)):
-        texts = [(name, text) for name, text in formats(made) if isinstance(text, str)]
+        texts = [(name, text) for name, text in every_text(made) if isinstance(text, str)]
         assert [name for name, text in texts if (EARLIER in text) != said] == [], "it says EARLIER where case.earlier"
 
 

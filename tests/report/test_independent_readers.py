@@ -7,11 +7,11 @@ from pathlib import Path
 import pytest
 from assurance.sample import rover_case
 from google.protobuf import json_format
+from helpers import every_text
 from in_toto_attestation.v1 import statement_pb2
 from in_toto_attestation.v1.statement import Statement
 from sarif import loader
 
-from avow.report import formats
 from report.hostile import hostile_case
 
 CASES = {"rover": rover_case, "hostile": hostile_case}
@@ -20,7 +20,7 @@ CASES = {"rover": rover_case, "hostile": hostile_case}
 @pytest.mark.parametrize("name", list(CASES))
 def test_sarif_tools_reads_both_profiles(name: str, tmp_path: Path) -> None:
     case = CASES[name]()
-    texts = dict(formats(case))
+    texts = dict(every_text(case))
     counts = {}
     for profile in ("report.sarif", "findings.sarif"):
         (tmp_path / profile).write_text(str(texts[profile]), encoding="utf-8")
@@ -32,7 +32,7 @@ def test_sarif_tools_reads_both_profiles(name: str, tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", list(CASES))
 def test_in_toto_validates_every_statement(name: str) -> None:
     case = CASES[name]()
-    lines = str(dict(formats(case))["attestation.jsonl"]).splitlines()
+    lines = str(dict(every_text(case))["attestation.jsonl"]).splitlines()
     assert lines
     for line in lines:
         message = statement_pb2.Statement()
@@ -41,7 +41,7 @@ def test_in_toto_validates_every_statement(name: str) -> None:
 
 
 def test_a_broken_statement_is_refused() -> None:
-    line = str(dict(formats(rover_case()))["attestation.jsonl"]).splitlines()[0]
+    line = str(dict(every_text(rover_case()))["attestation.jsonl"]).splitlines()[0]
     message = statement_pb2.Statement()
     json_format.Parse(line.replace("https://in-toto.io/Statement/v1", "https://in-toto.io/Statement/v9"), message)
     with pytest.raises(ValueError, match="type"):

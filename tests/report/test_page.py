@@ -12,14 +12,14 @@ from pathlib import Path
 import pytest
 from assurance.sample import case as make_case
 from assurance.sample import evidence, guarantee, obligation, rover_case, system
-from helpers import some
+from helpers import every_text, some
 
 from avow.assurance.model import Case
 from avow.assurance.traceability import trace
 from avow.base.verdict import Verdict
 from avow.evidence.obligation import SYSTEM_LEVEL, Kind
 from avow.evidence.status import Status
-from avow.report import formats, gsn_svg, render_all, wording
+from avow.report import gsn_svg, render_all, wording
 from avow.report.answers_page import render_index
 from avow.report.page import render_page, render_traceability
 from report.hostile import hostile_case
@@ -204,7 +204,7 @@ def test_a_goal_says_how_its_claim_stands_all_things_considered() -> None:
     good, bad = guarantee("n", "kept"), guarantee("m", "broken")
     fails = obligation("n", Kind.SANITY, "consistent")
     records = [evidence(good), evidence(bad, Verdict.REFUTED), evidence(fails, Verdict.REFUTED, "sanity")]
-    made = dict(formats(make_case(system({"n": ["kept"], "m": ["broken"]}), [good, bad, fails], records)))
+    made = dict(every_text(make_case(system({"n": ["kept"], "m": ["broken"]}), [good, bad, fails], records)))
     drawn, told = made["gsn.svg"], made["gsn.yaml"]
     assert isinstance(drawn, str)
     assert isinstance(told, str)
@@ -223,7 +223,7 @@ def test_circles_in_the_support_do_not_hang_the_picture() -> None:
         requirements=[Requirement("A", "a", None, None, ("B",)), Requirement("B", "b", None, None, ("A", "n"))],
     )
     found = make_case(subject, [guarantee("n", "g")], [])
-    assert dict(formats(found))["gsn.svg"]
+    assert dict(every_text(found))["gsn.svg"]
 
 
 def test_index_tells_every_system() -> None:

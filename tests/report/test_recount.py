@@ -15,6 +15,7 @@ import pytest
 from assurance.sample import case as make_case
 from assurance.sample import evidence, guarantee, keys_of, node_plan, system
 from assurance.test_rates import sampled, three
+from helpers import every_text
 
 from avow.assurance.answers import Baseline
 from avow.assurance.changes import KINDS, baseline_of
@@ -30,7 +31,7 @@ from avow.recount.__main__ import main
 from avow.recount.facts import Facts, upper
 from avow.recount.page import blocks
 from avow.recount.rules import _DEFICITS
-from avow.report import formats, render_all
+from avow.report import render_all
 from avow.system.plan import EnvironmentInput, Finding, Hazard, Requirement
 from report.test_answers_page import CASES as PAGES
 from report.test_answers_page import REPORTS
@@ -74,7 +75,7 @@ CASES: dict[str, Callable[[], Case]] = {
 
 @cache
 def made(name: str) -> tuple[str, bytes]:
-    found = dict(formats(CASES[name]()))
+    found = dict(every_text(CASES[name]()))
     return found["index.html"], found["report.json"].encode()
 
 
@@ -142,7 +143,7 @@ def test_changes_since_a_signature_are_borne_out_and_changed_ones_found() -> Non
     found = set[str]()
     for seed in range(30):
         later = _signed_first(seed)
-        texts = dict(formats(later))
+        texts = dict(every_text(later))
         page, data = texts["index.html"], texts["report.json"].encode()
         assert recounted(page, data) == [], seed
         found |= {entry.kind for entry in later.changes.entries}
@@ -256,7 +257,7 @@ def test_a_bound_is_computed_again_from_its_sample() -> None:
         told = {"runs": 47, "failures": 0, "failure probability at most": bound, "confidence": 0.95}
         target = guarantee("n", "g")
         found = make_case(system({"n": ["g"]}), [target], [evidence(target, Verdict.TESTED, "experiment", bound=told)])
-        texts = dict(formats(found))
+        texts = dict(every_text(found))
         return recounted(texts["index.html"], texts["report.json"].encode())
 
     assert shown(0.0618) == []

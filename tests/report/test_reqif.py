@@ -11,12 +11,12 @@ import pytest
 import xmlschema
 from assurance.sample import case as make_case
 from assurance.sample import evidence, guarantee, node_plan, rover_case, system
+from helpers import every_text
 from reqif import PATH_TO_REQIF_ROOT
 from reqif.parser import ReqIFParser
 from reqif.reqif_bundle import ReqIFBundle
 
 from avow.assurance.model import Case
-from avow.report import formats
 from avow.report.reqif import KINDS, identifier
 from avow.report.wording import clean
 from avow.system.plan import Hazard, Requirement
@@ -46,7 +46,7 @@ CASES: dict[str, Callable[[], Case]] = {
 @pytest.fixture(params=list(CASES))
 def exported(request: pytest.FixtureRequest) -> tuple[Case, dict[str, str]]:
     made = CASES[request.param]()
-    return made, {name: str(text) for name, text in formats(made) if name.startswith("traceability.")}
+    return made, {name: str(text) for name, text in every_text(made) if name.startswith("traceability.")}
 
 
 @pytest.fixture(scope="module")
@@ -60,7 +60,7 @@ def test_the_schema_accepts_it(exported: tuple[Case, dict[str, str]], schema: xm
 
 
 def test_the_schema_rejects_seeded_faults(schema: xmlschema.XMLSchema) -> None:
-    text = str(dict(formats(mitigated()))["traceability.reqif"])
+    text = str(dict(every_text(mitigated()))["traceability.reqif"])
     for old, new in (
         ("<REQ-IF-VERSION>1.0", "<REQ-IF-VERSION>9.9"),
         (' LAST-CHANGE="', ' CHANGED="'),
@@ -121,7 +121,7 @@ def test_it_has_the_paths_of_the_csv_and_no_others(exported: tuple[Case, dict[st
 
 def test_an_identifier_stays_when_only_the_state_changes() -> None:
     first, second = (
-        values(ReqIFParser.parse_from_string(str(dict(formats(c))["traceability.reqif"])))
+        values(ReqIFParser.parse_from_string(str(dict(every_text(c))["traceability.reqif"])))
         for c in (
             mitigated(),
             make_case(

@@ -13,6 +13,7 @@ import pytest
 import yaml
 from assurance.sample import case as make_case
 from assurance.sample import evidence, guarantee, node_plan, obligation, rover_case, system
+from helpers import every_text
 from reqif.parser import ReqIFParser
 
 from avow.assurance.model import Gate
@@ -20,7 +21,6 @@ from avow.assurance.naming import short
 from avow.base.verdict import Object, Verdict
 from avow.evidence.obligation import Kind
 from avow.evidence.status import Status
-from avow.report import formats
 from avow.report.markdown import render_markdown
 from avow.report.page import render_page
 from avow.report.wording import bound_text, gate_line, tone, tool_command
@@ -99,7 +99,7 @@ def test_a_claim_has_one_status_in_every_format(verdict: str) -> None:
     hazards = [Hazard("H1", "It burns", "critical", mitigated_by=("R",)), Hazard("H2", "It drifts", "marginal")]
     subject = system({"agent": ["g1", "g2"]}, plans=plans, requirements=asked, hazards=hazards)
     found = make_case(subject, [first, second, own], records)
-    made = {name: text for name, text in formats(found) if isinstance(text, str)}
+    made = {name: text for name, text in every_text(found) if isinstance(text, str)}
     levels = {r.id: r.level.value for r in found.requirements}
     claims = {view.id: view.standing.value for view in found.obligations} | {own.id: levels["Q"]}
     dangers = {view.hazard.id: view.level.value for view in found.hazards}

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 from assurance.sample import case, evidence, guarantee, node_plan, system
+from helpers import every_text
 
 from avow.assurance.answers import Level
 from avow.assurance.case import conclude_again
@@ -15,7 +16,6 @@ from avow.assurance.traceability import trace
 from avow.base.diagnostics import Rejected
 from avow.base.verdict import Verdict
 from avow.evidence.record import Evidence
-from avow.report import formats
 from avow.report.bowtie import bowtie
 from avow.system.load import load_system
 from avow.system.plan import Hazard, Requirement, System
@@ -175,7 +175,7 @@ def test_a_security_goal_rests_on_who_feeds_an_input(tmp_path: Path) -> None:
     assert (gate.passed, "S2: not shown" in gate.reason, "S1" in gate.reason) == (False, True, False)
     rows = {row.hazards: (row.obligation, row.status) for row in trace(found) if row.hazards}
     assert rows == {"S1": ("n.order", "argued"), "S2": ("n.r", "missing")}
-    made = dict(formats(found))
+    made = dict(every_text(found))
     for name in ("gsn.yaml", "sacm.xml", "traceability.reqif"):
         assert "in the graph only remote reaches n.order" in str(made[name]), name
     assert conclude_again(found) == found
