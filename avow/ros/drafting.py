@@ -389,13 +389,10 @@ class _Draft:
     def answers(self, node: Listed, looped: bool) -> str:
         """By stamp if all that it receives and publishes is stamped, and no stamp comes back to it in a loop."""
         topics = [t for t in (*node.subscribes, *node.publishes) if self.ports.get(t)]
-        if all(map(is_part, topics)):
-            return "{by: call}"
-        return (
-            "{by: stamp}"
-            if all(map(self.stamped, topics)) and not looped
-            else "{latency: 10 ms, jitter: 2 ms, because: …}"
-        )
+        latency = "{latency: 10 ms, jitter: 2 ms, because: …}"
+        if any(map(is_part, topics)):
+            return "{by: call}" if all(map(is_part, topics)) else f"{{by: call, others: {latency}}}"
+        return "{by: stamp}" if all(map(self.stamped, topics)) and not looped else latency
 
 
 def _constants(wire: Wire, name: str, holder: Message) -> dict[str, str]:

@@ -196,7 +196,7 @@ def ask(
         watched.tally.too_early(n for n in missing if n not in monitor.supposed)
         return
     own = tuple(n for n in speaks(monitor, watched) if n in values)
-    inputs = tuple(n for n in asks(monitor, watched) if n in watched.paired or n in pairing.seen)
+    inputs = tuple(n for n in asks(monitor, watched) if n in watched.paired or n in pairing.seen or n in pairing.times)
     heard = monitor.heard_of(watched.outputs) if answer is None else answer.heard
     known, places = {n: values[n] for n in own}, tuple({place for place, _ in heard.values()})
     watched.asked = inputs
@@ -210,7 +210,7 @@ def judge_answer(monitor: Monitor, asked: Asked, choices: Choices, found: list[V
     watched, tally = asked.watched, asked.watched.tally
     cases = choices if isinstance(choices, str) else pairing.cases(asked, choices)
     if cases == EARLY:
-        tally.too_early(name for name in asked.inputs if pairing.current(name, asked) == EARLY)
+        tally.too_early(name for name in asked.timed if pairing.current(name, asked) == EARLY)
         return
     if isinstance(cases, str):
         tally.unsure(cases)

@@ -120,7 +120,7 @@ class Watch:
         found = monitor.about(names)
         if any(watched.held or not watched.outputs <= set(names) for watched in found):
             return None
-        if answers is not None and {*answers.input[:1], *answers.output[:1]} & {*ENVELOPE}:
+        if answers is not None and (answers.others or {*answers.input[:1], *answers.output[:1]} & {*ENVELOPE}):
             return None
         return _Plan(names, tuple(w for w in found if not w.paired), tuple(w for w in found if w.paired))
 

@@ -111,7 +111,7 @@ class Monitor:
         self.word = word_of(self.setup, watched)
         if self.word is None and given is not None and given.by != "arrival":
             self.pairing = Pairing(given)
-            if given.by == "latency":
+            if given.by == "latency" or given.others:
                 self.pairing.begins({n: v for n, v in self.values.items() if n in self.paired})
         else:
             self.so_far = SoFar(self.setup.leeway.jitter) if remembers(node) else None
@@ -445,7 +445,8 @@ class Monitor:
         if not triggers:
             self._constant.append(watched)
         if self.pairing is not None and self.pairing.answers.by in ("key", "stamp", "call") and watched.paired:
-            self.pairing.replies[id(watched)] = Replies(watched)
+            keyed = frozenset(watched.paired) - self.pairing.answers.timed(watched.outputs, watched.paired, "")
+            self.pairing.replies[id(watched)] = Replies(watched, keyed)
         if clause.kind is ClauseKind.ASSUMPTION:
             self.assumptions.append(watched)
 

@@ -20,7 +20,7 @@ from avow.language.load import parse_term
 from avow.language.sorts import BOOL, BoolSort, FunctionSort, RealSort
 from avow.language.terms import Apply, Not, Quantified, Quantifier, Role, Term, Variable
 from avow.ros.bags import Event, Origin, is_bag, publisher
-from avow.ros.calls import CALL, part_topic
+from avow.ros.calls import CALL, is_part, named, part_topic
 from avow.ros.definitions import Definitions, Message, NoField, Wire
 from avow.ros.sources import definitions
 from avow.system.graph import dataflow
@@ -99,13 +99,15 @@ class Setup:
         return {same_topic(rule.topic): rule.kind for rule in self.carried.values() if rule.kind}
 
     def unmarked(self, names: Collection[str], typed: bool) -> str:
-        """Why the inputs and outputs among these variables cannot be paired; empty if they can, as far as is known.
-        `typed`: messages have the fields of their types only."""
-        answers, carried = self.answers, {name: rule for name, rule in self.carried.items() if name in names}
+        """Why the inputs and outputs among these cannot be paired, as far as known. `typed`: all fields are known."""
+        answers, carried = self.answers, {n: rule for n, rule in self.carried.items() if n in names}
         if not set() < carried.keys() & self.heard < carried.keys():
             return ""
         if answers is None:
             return "the plan does not say which input an answer answered: add `answers` to the method"
+        alone = [name for name, rule in carried.items() if not is_part(rule.topic)]
+        if answers.by == "call" and not answers.others and alone:
+            return f"{alone[0]} is part of no call: pair the others by latency (`answers: {{by: call, others: …}}`)"
         for name, rule in carried.items() if typed else ():
             way = answers.input if name in self.heard else answers.output
             message = self.known.get(rule.kind)
@@ -237,9 +239,11 @@ class _Work:
         if not isinstance(entry, Mapping):
             return None
         by = str(entry.get("by", "latency"))
+        said = {**entry, **entry.get("others", {})}
+        parts = {n: r.topic for n, r in self.rules.items() if isinstance(r, Fields | Choice) and is_part(r.topic)}
         for name, rule in self.rules.items() if by not in ("arrival", "latency") else ():
             known = isinstance(rule, Fields | Choice) and of_latest(rule) and rule.initial is not None
-            if known and name.startswith(f"{Role.INPUT}."):
+            if known and name.startswith(f"{Role.INPUT}.") and (name in parts or "others" not in entry):
                 text = f"by {by} it has no effect: an answer is judged with the message that it answered"
                 self.fault(text, name, "initial", hint=f"leave it out, {_PAIR}")
         ends = ((p, observing.sources(self.system, self.node, p.name)) for p in self.node.inputs)
@@ -249,12 +253,14 @@ class _Work:
         usual = {"stamp": ("header", "stamp"), "call": (CALL,), "order": (NUMBER,)}.get(by, ())
         return Answers(
             by,
-            str(entry.get("because", "")),
+            str(said.get("because", "")),
             observing.path(str(entry["input"])) if "input" in entry else usual,
             observing.path(str(entry["output"])) if "output" in entry else usual,
-            self.duration("answers.latency", entry.get("latency", "0 s")),
-            self.duration("answers.jitter", entry.get("jitter", "0 s")),
+            self.duration("answers.latency", said.get("latency", "0 s")),
+            self.duration("answers.jitter", said.get("jitter", "0 s")),
             frozenset(port.variable.qualified for port in looped),
+            "others" in entry,
+            {name: named(topic).partition("/_action/")[0] for name, topic in parts.items()},
         )
 
     def leeway(self, data: Mapping[str, Any]) -> Leeway:

@@ -4,9 +4,9 @@ By `arrival`, an answer is compared with the values that came before it: for tra
 `key` or `stamp`, with those of the message that has the same key. By `latency`, each input may have had any value that
 was current from `latency + jitter` before the answer to `jitter` after it, independently: what holds for all
 combinations holds, what is broken for all is broken, and anything else is undecided. By `call`, with the request of the
-same call; by `order`, the k-th with the k-th: the engine numbers the messages of each topic (`NUMBER`), and the number
-is the key. Independence includes more combinations than occurred, so that both verdicts are right as long as the two
-bounds are.
+same call, and with `others` by latency with inputs that are no part of its service or action. By `order`, the k-th with
+the k-th: the engine numbers the messages of each topic (`NUMBER`), and the number is the key. Independence includes
+more combinations than occurred, so that both verdicts are right as long as the two bounds are.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import itertools
 import math
 from bisect import insort
 from collections import OrderedDict, deque
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from operator import attrgetter
@@ -51,6 +51,17 @@ class Answers:
     jitter: Fraction = Fraction(0)
     looped: frozenset[str] = frozenset()
     """The inputs that earlier answers of the node reach: a message after an answer may be made from it."""
+    others: bool = False
+    """By call: whether the other inputs are paired by latency."""
+    calls: Mapping[str, str] = field(default_factory=dict)
+    """With `others`: variable → the service or action of whose calls it is a part."""
+
+    def timed(self, outputs: Collection[str], inputs: Iterable[str], key: object) -> frozenset[str]:
+        """The inputs with which an answer is paired by latency."""
+        if self.by == "latency":
+            return frozenset(inputs)
+        own = {self.calls.get(name) for name in outputs} - {None} if key is not None else set()
+        return frozenset(name for name in inputs if self.calls.get(name) not in own) if self.others else frozenset()
 
 
 Ticks = int | Fraction
@@ -103,6 +114,8 @@ class Asked:
     """Those of them that may have no message yet."""
     number: int = 0
     """Its number among all that were asked."""
+    timed: frozenset[str] = frozenset()
+    """The inputs that it is paired with by latency."""
 
 
 @dataclass(slots=True, eq=False)
@@ -123,6 +136,8 @@ class Replies:
     """Which inputs of one guarantee got no answer, although a later one did."""
 
     watched: Watched
+    inputs: frozenset[str]
+    """Those that are paired by their keys."""
     came: OrderedDict[object, set[str]] = field(default_factory=OrderedDict)
     """For each key, the inputs that have come, while others have not."""
     waiting: OrderedDict[object, None] = field(default_factory=OrderedDict)
@@ -132,13 +147,13 @@ class Replies:
     answered: OrderedDict[object, None] = field(default_factory=OrderedDict)
 
     def heard(self, name: str, keys: Iterable[object]) -> None:
-        alone, came = len(self.watched.paired) == 1, self.came
-        for key in keys if name in self.watched.paired else ():
+        alone, came = len(self.inputs) == 1, self.came
+        for key in keys if name in self.inputs else ():
             if key is None:
                 continue
             if not alone:
                 came.setdefault(key, set()).add(name)
-            if (alone or len(came[key]) == len(self.watched.paired)) and key not in self.passed:
+            if (alone or len(came[key]) == len(self.inputs)) and key not in self.passed:
                 came.pop(key, None)
                 self.waiting[key] = None
                 if key in self.answered:
@@ -197,6 +212,8 @@ class Pairing:
 
     answers: Answers
     seen: dict[str, _Seen] = field(default_factory=dict)
+    times: dict[str, _Seen] = field(default_factory=dict)
+    """With `others`: the same messages in the order of time."""
     waiting: dict[int, Asked] = field(default_factory=dict)
     """The answers by their numbers."""
     asked: int = 0
@@ -217,16 +234,16 @@ class Pairing:
     """The answers that wait for each key."""
     _touched: list[object] = field(default_factory=list)
     """The keys of the messages that came since answers were last judged."""
+    _early: dict[int, Asked] = field(default_factory=dict)
+    """The answers, by their numbers, to whose timed inputs later messages may belong."""
 
     def __post_init__(self) -> None:
         self.latency, self.jitter = ticks(self.answers.latency), ticks(self.answers.jitter)
+        self.times = self.times if self.answers.others else self.seen
 
     def input(self, name: str) -> _Seen:
         """The messages of an input, of which there may be none yet."""
-        known = self.seen.get(name)
-        if known is None:
-            known = self.seen[name] = _Seen()
-        return known
+        return self.seen.setdefault(name, _Seen())
 
     def later(self, name: str, time: Fraction) -> int:
         """The number of messages of an input that are later than a time, as far as they are kept."""
@@ -243,27 +260,34 @@ class Pairing:
     def begins(self, values: Mapping[str, Value]) -> None:
         """The values before any message: at no time and no place, so that they have no age."""
         for name, value in values.items():
-            self.input(name).messages.append(InputMessage(-2 * LATEST_TIME * TICKS, math.inf, None, value, 0))
+            self.times.setdefault(name, _Seen()).messages.append(
+                InputMessage(-2 * LATEST_TIME * TICKS, math.inf, None, value, 0)
+            )
 
     def saw(
         self, name: str, time: Ticks, seconds: float, key: object, value: Value | Mapping[str, Any] | None, place: int
     ) -> InputMessage:
         """A message of an input, at a place of the trace."""
-        known = self.input(name)
+        message = InputMessage(time, seconds, key, value, place)
         if self.answers.by != "latency":
-            message = InputMessage(time, seconds, key, value, place)
+            known = self.input(name)
             self._touched.append(message.key)
             self.heard(name, (key,))
             if any(one.used and self._differ(name, one, message) for one in known.by_key.get(message.key, ())):
                 self.late = self.late or f"a message of {name} has the key of one that was answered before"
             known.keep(message)
-            return message
+        if self.answers.by == "latency" or self.answers.others:
+            self._sort(name, message)
+        return message
+
+    def _sort(self, name: str, message: InputMessage) -> None:
+        """Keep a message in the order of time."""
+        time, messages = message.time, self.times.setdefault(name, _Seen()).messages
         if self.settled is not None and time <= self.settled:
             self.late = self.late or (
                 f"a message of {name} has the time {show(Fraction(time) / TICKS)}, and comes after answers up to then "
                 "were judged: by latency, a trace has to be in the order of time"
             )
-        messages, message = known.messages, InputMessage(time, seconds, None, value, place)
         if messages and messages[-1].time > time:
             insort(messages, message, key=_time)
         else:
@@ -273,7 +297,6 @@ class Pairing:
         since = first - self.latency - 2 * self.jitter
         while len(messages) > 1 and messages[1].time <= since:
             messages.popleft()
-        return message
 
     def _differ(self, name: str, one: InputMessage, other: InputMessage) -> bool:
         """Whether two messages have different values (an unreadable one always differs)."""
@@ -285,6 +308,9 @@ class Pairing:
         self.asked += 1
         asked.number = self.asked
         self.waiting[asked.number] = asked
+        asked.timed = self.answers.timed(asked.watched.outputs, asked.inputs, asked.key)
+        if asked.timed or self.answers.by == "latency":
+            self._early[asked.number] = asked
         self._awaited.setdefault(asked.key, []).append(asked)
         self._touched.append(asked.key)
 
@@ -295,17 +321,17 @@ class Pairing:
     def ready(self, now: Ticks | None) -> Iterator[tuple[Asked, Choices]]:
         """The answers whose inputs are known at a time (None: the run is over), each with the messages of each input
         that it may have answered, or why there are none."""
-        latency = self.answers.by == "latency"
         for asked in self._whole(now):
             del self.waiting[asked.number]
+            self._early.pop(asked.number, None)
             self._awaited[asked.key].remove(asked)
             if not self._awaited[asked.key]:
                 del self._awaited[asked.key]
-            if latency:
+            if asked.timed or self.answers.by == "latency":
                 self.settled = max(self.settled or 0, asked.time + self.jitter)
             found: Choices = []
             for name in asked.inputs:
-                one = self.current(name, asked) if latency else self._same_key(name, asked)
+                one = self.current(name, asked) if name in asked.timed else self._same_key(name, asked)
                 if isinstance(one, str):
                     found = one
                     break
@@ -326,15 +352,19 @@ class Pairing:
         self._touched.clear()
         if now is None:
             return iter([*waiting.values()])
+        timely = [*itertools.takewhile(lambda asked: now > asked.time + self.jitter, self._early.values())]
         if self.answers.by == "latency":
-            return iter([*itertools.takewhile(lambda asked: now > asked.time + self.jitter, waiting.values())])
+            return iter(timely)
+        for asked in timely:
+            del self._early[asked.number]
         late = itertools.takewhile(lambda asked: asked.number <= self.asked - KEYS_KEPT, waiting.values())
-        whole = [asked for key in touched for asked in self._awaited.get(key, ()) if self._known(asked)]
+        ready = (*timely, *(asked for key in touched for asked in self._awaited.get(key, ())))
+        whole = [asked for asked in ready if asked.number not in self._early and self._known(asked)]
         return iter(sorted({asked.number: asked for asked in (*late, *whole)}.values(), key=_number))
 
     def _known(self, asked: Asked) -> bool:
         """Whether all messages that an answer is paired with have come."""
-        inputs = () if asked.key is None else asked.inputs
+        inputs = () if asked.key is None else (name for name in asked.inputs if name not in asked.timed)
         return all(name in self.seen and asked.key in self.seen[name].by_key for name in inputs)
 
     def cases(self, asked: Asked, choices: list[list[InputMessage]]) -> list[dict[str, Value]] | str:
@@ -348,7 +378,7 @@ class Pairing:
                     return f"a message of {name} could not be read"
                 if value not in values:
                     values.append(value)
-            if len(values) > 1 and self.answers.by != "latency":
+            if len(values) > 1 and name not in asked.timed:
                 return f"several messages of {name} have the key"
             distinct.append(values)
         if (count := math.prod(map(len, distinct))) > COMBINATIONS:
@@ -366,7 +396,7 @@ class Pairing:
         end = asked.time + self.jitter
         current: list[InputMessage] = []
         before = False
-        for message in self.seen[name].messages if name in self.seen else ():
+        for message in self.times[name].messages if name in self.times else ():
             if message.time <= start:
                 current, before = [message], True
                 asked.since[name] = message.seconds

@@ -216,7 +216,7 @@ def undetermined(setup: Setup, clause: Clause) -> str:
     if not histories(clause.formula):
         return ""
     assert setup.answers is not None
-    if setup.answers.by == "latency":
+    if setup.answers.by == "latency" or setup.answers.others:
         return "it refers to other steps, whose order `answers: {latency: …}` does not determine"
     if timed(clause.formula) is not None:
         return "it has limits in seconds, which are judged with `answers: {by: arrival}` only"

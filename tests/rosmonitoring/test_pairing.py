@@ -385,3 +385,85 @@ def test_an_input_that_breaks_an_assumption_needs_no_answer(make_system: Callabl
     violations, tallies = judge(make_system(RCL, MAPPING, answers=KEY), events)
     assert [v.fault for v in violations] == [Fault.ASSUMPTION]
     assert tallies["low"].unanswered == 1
+
+
+BESIDE = """
+node n {
+  inputs( hold : BOOL, speed : REAL )
+  outputs( held : BOOL, motor : REAL )
+  topics( std_srvs/SetBool_Request stop matches(in.hold), std_srvs/SetBool_Response stop matches(out.held),
+          float64 speed matches(in.speed), float64 motor matches(out.motor) )
+  assume slow ( in.speed < 40 )
+  guarantee obeyed ( out.held <=> in.hold )
+  guarantee taken ( out.held -> in.hold and in.speed < 10 )
+  guarantee still ( in.hold -> out.motor == 0 )
+}
+"""
+FIELDS = {"in.hold": "data", "out.held": "success", "in.speed": "data", "out.motor": "data"}
+OTHERS = {"by": "call", "others": LATENCY}
+TRUE = {
+    "obeyed": lambda v: v["out.held"] == v["in.hold"],
+    "taken": lambda v: not v["out.held"] or (v["in.hold"] and v["in.speed"] < 10),
+    "still": lambda v: not v["in.hold"] or v["out.motor"] == 0,
+}
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_a_request_is_paired_by_its_call_and_a_state_beside_it_by_latency(
+    seed: int, make_system: Callable[..., System]
+) -> None:
+    """Against brute force over the request of the answer's call, and over every value that a state may have had."""
+    rng = random.Random(seed)
+    events: list[Event] = [
+        {"topic": "/stop/_request", "data": False, "_call": "c0", "time": 0.0},
+        {"topic": "speed", "data": 1.0, "time": 0.0},
+    ]
+    at, open_calls, number = 0.1, [], 0
+    for _ in range(120):
+        at = round(at + rng.choice((0.001, 0.004, 0.01, 0.03)), 6)
+        match rng.choice("qqsmr"):
+            case "q":
+                number += 1
+                open_calls.append((f"c{number}", rng.random() < 0.5))
+                event = {"topic": "/stop/_request", "data": open_calls[-1][1], "_call": f"c{number}"}
+            case "r" if open_calls:
+                call, hold = open_calls.pop(rng.randrange(len(open_calls)))
+                event = {"topic": "/stop/_response", "success": hold is not (rng.random() < 0.2), "_call": call}
+            case "m":
+                event = {"topic": "motor", "data": rng.choice((0.0, 3.0))}
+            case _:
+                event = {"topic": "speed", "data": rng.choice((1.0, 5.0, 20.0, 50.0))}
+        events.append({**event, "time": at})
+    violations, tallies = judge(make_system(BESIDE, FIELDS, answers=OTHERS), events)
+
+    def around(topic: str, when: Fraction) -> list[Any]:
+        times = [(Fraction(str(e["time"])), e["data"]) for e in events if e["topic"] == topic]
+        start, end = when - Fraction("0.025"), when + Fraction("0.005")
+        before = [value for time, value in times if time <= start]
+        return before[-1:] + [value for time, value in times if start < time <= end]
+
+    for name, topic in (("obeyed", "/stop/_response"), ("taken", "/stop/_response"), ("still", "motor")):
+        broken, judged = set(), 0
+        for index, event in enumerate(events, start=1):
+            if event["topic"] != topic:
+                continue
+            when, call = Fraction(str(event["time"])), event.get("_call")
+            asked = [e["data"] for e in events if call and e["topic"] == "/stop/_request" and e["_call"] == call]
+            cases = [
+                {"in.hold": h, "in.speed": s, "out.held": event.get("success"), "out.motor": event.get("data")}
+                for h in asked or around("/stop/_request", when)
+                for s in around("speed", when)
+            ]
+            found = {"held" if TRUE[name](c) else "excused" if c["in.speed"] >= 40 else "broken" for c in cases}
+            judged += len(found) == 1
+            broken |= {index} if found in ({"broken"}, {"excused"}) else set()
+        assert {v.index for v in violations if v.clause == name} == broken, name
+        assert tallies[name].judged == judged, name
+
+
+def test_without_a_way_for_a_state_beside_a_service_the_plan_is_told(make_system: Callable[..., System]) -> None:
+    system = make_system(BESIDE, FIELDS, answers={"by": "call"})
+    found, _ = setup(system, system.contract.node("n"), system.plan.node("n").methods[0].options)
+    assert found.unmarked({"in.hold", "out.held"}, typed=True) == ""
+    told = found.unmarked({"in.speed", "in.hold", "out.held"}, typed=True)
+    assert told.startswith("in.speed is part of no call: pair the others by latency")
