@@ -4,6 +4,7 @@ read by Foxglove, PlotJuggler, and other readers of JSON channels."""
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -16,7 +17,7 @@ from avow.base.diagnostics import Diagnostic, Rejected
 from avow.evaluation.evaluate import NotEvaluable, compile_term
 from avow.formulas.values import Value
 from avow.language.sorts import IntegerSort, NaturalSort, RealSort
-from avow.language.terms import And, Compare, Term
+from avow.language.terms import And, Compare, Iff, Implies, Not, Or, Term
 
 from .engine import Monitor
 from .pairing import Asked, Choices, time_of
@@ -117,41 +118,53 @@ def _verdict_between(before: Tally, after: Tally) -> str:
 
 
 def _margin_of(formula: Term) -> Margin | None:
-    """The distance of a comparison of numbers from being broken, negative if it is: ``b - a`` for ``a <= b`` and for
-    ``a < b``, minus the numbers' distance for ``a == b``, their distance for ``a != b``, and the least for a
-    conjunction. None for any other formula. At 0 the operator decides."""
+    """The distance of a formula from being broken, negative if it is (max-min semantics: G. Fainekos and G. Pappas,
+    2009): ``b - a`` for ``a <= b`` and for ``a < b``, minus the numbers' distance for ``a == b``, their distance for
+    ``a != b``; the least for a conjunction, the greatest for a disjunction. A part without comparison of numbers is
+    infinitely far. At 0 the operator decides. None if the whole is infinitely far, or cannot be evaluated."""
+    try:
+        margin = _compiled(formula)
+    except NotEvaluable:
+        return None
+
+    def finite(values: Mapping[str, Value]) -> float | None:
+        try:
+            found = margin(values)
+        except NotEvaluable:
+            return None
+        return found if math.isfinite(found) else None
+
+    return finite
+
+
+def _compiled(formula: Term) -> Callable[[Mapping[str, Value]], float]:
+    """As `_margin_of`, with infinities. It and its result raise NotEvaluable."""
     match formula:
-        case And(items=items):
-            parts = [_margin_of(item) for item in items]
-            known = [part for part in parts if part is not None]
-            if len(known) < len(parts):
-                return None
-            return lambda values: _least([part(values) for part in known])
+        case And(items=items) | Or(items=items):
+            parts, choose = [_compiled(item) for item in items], min if isinstance(formula, And) else max
+            return lambda values: choose(part(values) for part in parts)
+        case Not(body=body):
+            inner = _compiled(body)
+            return lambda values: -inner(values)
+        case Implies(left=left, right=right):
+            return _compiled(Or((Not(left), right)))
+        case Iff(left=left, right=right):
+            return _compiled(And((Implies(left, right), Implies(right, left))))
         case Compare(operator=operator, left=left, right=right) if isinstance(
             left.sort, RealSort | IntegerSort | NaturalSort
         ):
-            try:
-                one, other = compile_term(left), compile_term(right)
-            except NotEvaluable:
-                return None
+            one, other = compile_term(left), compile_term(right)
             return lambda values: _distance(operator, one, other, values)
         case _:  # no threshold
-            return None
-
-
-def _least(found: list[float | None]) -> float | None:
-    known = [one for one in found if one is not None]
-    return min(known) if known and len(known) == len(found) else None
+            holds = compile_term(formula)
+            return lambda values: math.inf if holds(values) else -math.inf
 
 
 def _distance(
     operator: str, one: Callable[[Mapping[str, Value]], Value], other: Callable[[Mapping[str, Value]], Value],
     values: Mapping[str, Value],
-) -> float | None:  # fmt: skip
-    try:
-        difference = Fraction(other(values)) - Fraction(one(values))  # type: ignore[arg-type]
-    except NotEvaluable:
-        return None
+) -> float:  # fmt: skip
+    difference = Fraction(other(values)) - Fraction(one(values))  # type: ignore[arg-type]
     match operator:
         case "<=" | "<":
             margin = difference

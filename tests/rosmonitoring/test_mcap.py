@@ -99,8 +99,7 @@ def test_each_judgement_is_there_and_its_margin_agrees(tmp_path: Path, capsys: p
         counted = (len(said), said.count("broken") + said.count("excused") * (clause["kind"] == "guarantee"))
         assert counted == (clause["judged"], clause["broken"])
     assert len(found["findings"]) == len(with_mcap["violations"])
-    assert "mixed/margin" not in found
-    for name in ("above", "below", "same", "other", "within", "warm"):
+    for name in ("above", "below", "same", "other", "within", "warm", "mixed"):
         verdicts = {m["event"]: (at, m) for at, m in found[f"{name}/verdict"]}
         assert len(found[f"{name}/margin"]) == len(verdicts)
         for at, message in found[f"{name}/margin"]:
@@ -122,7 +121,7 @@ def test_margins_are_signed_distances(tmp_path: Path) -> None:
     margins = {name: found[0][1]["margin"] for name, found in channels(out).items() if name.endswith("/margin")}
     assert margins == {
         "warm/margin": 53.0, "above/margin": 6.5, "below/margin": -1.5, "same/margin": -6.5, "other/margin": 6.5,
-        "within/margin": 0.5,
+        "within/margin": 0.5, "mixed/margin": 9.5,
     }  # fmt: skip
 
 
