@@ -50,29 +50,30 @@ def _methods(system: System, node: str, wanted: Callable[[Backend], bool]) -> tu
     return tuple(sorted(found, key=lambda m: m.id))
 
 
-def beside(job: Job) -> tuple[Method, ...]:
-    """The other methods that the job's answer depends on: models that its program is compared with, and recordings."""
-    if not any(claim.name == ProgramClaim.LINKED for claim in job.claims):
-        return ()
+def beside(tool: Backend, job: Job) -> tuple[Method, ...]:
+    """The other methods that the job's answer depends on: models that its program is compared with, recordings, and the
+    monitors of a campaign."""
     system, node = job.system, job.node.name
+    if not any(claim.name == ProgramClaim.LINKED for claim in job.claims):
+        return recordings(system, node) if tool.campaigns in job.options else ()
     return (*models(system, node), *recordings(system, node), *unrun(system, node))
 
 
-def reads_recordings(job: Job) -> bool:
-    """Whether the job's program is run on recorded steps, whose reading depends on topics, connections and scenario."""
-    return any(backend(m.backend, job.system.plan.plugins).records for m in beside(job))
+def reads_recordings(tool: Backend, job: Job) -> bool:
+    """Whether the job reads recordings as monitors do: what they mean depends on topics, connections and scenario."""
+    return any(backend(m.backend, job.system.plan.plugins).records for m in beside(tool, job))
 
 
 def connected(tool: Backend, job: Job) -> bool:
     """Whether the job's answer may depend on topics, connections and other nodes."""
-    return wired(tool, job.source) or reads_recordings(job)
+    return wired(tool, job.source) or reads_recordings(tool, job)
 
 
 def told_too(tool: Backend, job: Job) -> frozenset[str]:
     """The backends whose options for other nodes the job's answer may depend on: its own, and those that read its
     messages."""
     judge = judge_of_runs() if wired(tool, job.source) and not tool.uses_wiring else None
-    reading = [m.backend for m in beside(job) if backend(m.backend, job.system.plan.plugins).records]
+    reading = [m.backend for m in beside(tool, job) if backend(m.backend, job.system.plan.plugins).records]
     return frozenset((tool.name, *reading, *([judge.name] if judge is not None else [])))
 
 

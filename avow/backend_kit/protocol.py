@@ -219,6 +219,10 @@ class Judged:
     """The event at which that was, from 1."""
     reason: str = ""
     """Why something is undecided."""
+    open: bool = False
+    """The run ends before a response is due."""
+    distance: float | None = None
+    """In a recording: the least distance of a judgement from a breach, negative after one; None if none has one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -229,6 +233,8 @@ class JudgedRun:
     """Guarantee → its result."""
     assumption: tuple[int, str] | None = None
     """The first event (from 1) that breaks an assumption or whose input is no value of its type, and why."""
+    unseen: tuple[str, ...] = ()
+    """The assumptions that were not judged: the messages do not have their inputs."""
 
 
 class NoModel(Exception):  # noqa: N818 - it names a state
@@ -342,6 +348,9 @@ class Backend(ABC):
     """Whether its options name recordings of the running node, whose steps it can extract (`steps`)."""
     judges_runs: bool = False
     """Whether it can judge runs of messages that another backend makes (`judge`)."""
+    campaigns: str = ""
+    """The option under which it has recorded runs judged by the node's monitors (`judges_runs`). With that option, an
+    answer depends on the monitors' options and files, and on topics, connections and scenario. Empty: it has none."""
     of: Object = Object.MODEL
     """The kind of artifact that it verifies; an outcome may override it."""
     portable: bool = False
@@ -407,11 +416,11 @@ class Backend(ABC):
         Raises Rejected if one cannot be read."""
         raise NotImplementedError(self.name)
 
-    def judge(self, job: Job) -> Callable[[Iterable[Mapping[str, Any]]], JudgedRun]:
+    def judge(self, job: Job) -> Callable[[Iterable[Mapping[str, Any]] | Path], JudgedRun]:
         """The contract's verdict on whole runs of messages on the node's topics: events as recordings have them
-        (`topic`,
-        `time` in seconds, fields; a last one without a topic gives the length). Uses the method's options in
-        `avow.backend_kit.given.READING`. Raises Rejected if they are at fault."""
+        (`topic`, `time` in seconds, fields; a last one without a topic gives the length), or a recording, by its
+        path in the system's folder: what would be no evidence for a clause is undecided there. Uses the method's
+        options in `avow.backend_kit.given.READING`, and all for a recording. Raises Rejected if they are at fault."""
         raise NotImplementedError(self.name)
 
     def translate(self, notation: str, system: System, node: Node) -> Translated:

@@ -27,6 +27,7 @@ gc.set_threshold(COLLECTED_IN_WORKS)  # most objects of a command stay alive, so
 COMMANDS = {
     "agent": "run an agent program step by step, on percepts that you give",
     "audit": "recompute every digest that the ledger records",
+    "campaign": "make the runs of a simulator as evidence, or search for a failing scenario",
     "check": "report errors and warnings of .rcl files and plans, in milliseconds",
     "compose": "show the derivation and its side conditions",
     "diff": "list what changed between two ledgers or two revisions",
@@ -58,6 +59,7 @@ COMMANDS = {
 
 _OF_BACKENDS = {
     "agent": "avow.backends.ajpf.command",
+    "campaign": "avow.backends.experiment.command",
     "drive": "avow.backends.rosmonitoring.driving",
     "monitor": "avow.backends.rosmonitoring.command",
     "review": "avow.backends.review.command",

@@ -97,7 +97,7 @@ def surroundings(tool: Backend, job: Job, options: str, files: Iterable[Path] | 
     types = sorted([name, sort_digest(sort)] for name, sort in named.types(job.contract))
     parts: list[Any] = [_ports(job.node), _settled_together(job), sorted(named.others(job)), constants, types]
     scenario = job.system.plan.scenario
-    if (tool.uses_scenario or reads_recordings(job)) and scenario:
+    if (tool.uses_scenario or reads_recordings(tool, job)) and scenario:
         parts.append(scenario.digest if tool.uses_scenario and tool.uses_steps else scenario.content)
     if connected(tool, job):
         parts.append(_wiring(job.system, job.node, told_too(tool, job)))

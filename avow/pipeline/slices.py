@@ -122,7 +122,7 @@ def method_slice(
         connections=tuple(replace(edge, implied=False, topic="") for edge in edges),
         messages=plan.messages if looks else (),
         ros=plan.ros if looks else Ros(),
-        scenario=plan.scenario if tool.uses_scenario or reads_recordings(job) else None,
+        scenario=plan.scenario if tool.uses_scenario or reads_recordings(tool, job) else None,
         plugins=() if is_portable(tool) else plan.plugins,
     )
     told = named.definitions(contract.definitions)
@@ -173,7 +173,7 @@ def _planned(tool: Backend, node: NodePlan, job: Job, backends: Collection[str])
     """With the methods whose models the program is compared with, those whose recordings it is run on, and, for a node
     that feeds itself, its options as a source (`_told`)."""
     told = tuple(m for m in node.methods if m.backend in backends)
-    others = {m.id: replace(m, guarantees=()) for m in (*beside(job), *told) if m.id != job.method.id}
+    others = {m.id: replace(m, guarantees=()) for m in (*beside(tool, job), *told) if m.id != job.method.id}
     methods = (job.method, *others.values())
     if told:  # in the plan's order, in which the key has them
         methods = tuple(sorted(methods, key=lambda m: [each.id for each in node.methods].index(m.id)))

@@ -178,7 +178,7 @@ def method_work(system: System, node: Node, method: Method, offered: Offered = N
         told,
         _files(files),
         surroundings(tool, job, told, files),
-        *_compared(system, job),
+        *_compared(system, tool, job),
     )
     return Work(
         system,
@@ -196,10 +196,10 @@ def method_work(system: System, node: Node, method: Method, offered: Offered = N
     )
 
 
-def _compared(system: System, job: Job) -> tuple[str, ...]:
-    """The models that the program is compared with, and the recordings: their programs, files and options."""
+def _compared(system: System, compared: Backend, job: Job) -> tuple[str, ...]:
+    """The methods beside the job's own (`beside`): their programs, files and options."""
     found = []
-    for method in beside(job):
+    for method in beside(compared, job):
         tool = method_backend(system, method)
         if tool.not_run:
             found.append([method.id, tool.not_run])

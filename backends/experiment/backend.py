@@ -15,7 +15,9 @@ from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.verdict import Link, Object, Verdict
 from avow.language.contract import Clause, Node
 
+from .campaign import NotMade, drawn, recorded, regressions
 from .options import SCHEMA, read
+from .profile import Campaign, command_files, read_campaign, regressions_of
 from .verdict import settle
 
 
@@ -32,6 +34,7 @@ class ExperimentBackend(Backend):
     uses_wiring = False
     link = Link.MAPPED
     of = Object.RECORDING
+    campaigns = "campaign"
     options_schema = SCHEMA
     codes = Catalogue("avow.backends.experiment")
     green_means = (
@@ -44,24 +47,34 @@ class ExperimentBackend(Backend):
 
     def check(self, job: Job) -> tuple[Diagnostic, ...]:
         try:
-            read(job)
+            if (campaign := _campaign(job)) is None:
+                read(job)
+            else:
+                regressions(campaign)
+                drawn(campaign)
         except Rejected as error:
             return error.diagnostics
+        except NotMade:  # the verdict says so
+            pass
         return ()
 
     def files(self, job: Job) -> tuple[Path, ...]:
         path = file_path(job, "data")
-        return (path,) if path is not None else ()
+        if path is None or "campaign" not in job.options:
+            return (path,) if path is not None else ()
+        recordings = path.with_suffix("")
+        made = (p for p in sorted(recordings.rglob("*")) if p.is_file()) if recordings.is_dir() else ()
+        return (path, regressions_of(path), *command_files(job), *made)
 
     def export(self, job: Job) -> Mapping[str, str]:
         """The claim as it will be judged; empty if options or data have errors."""
         try:
+            if _campaign(job) is not None:
+                return {"claim.json": document(_claim(job)) + "\n"}
             experiment = read(job)
         except Rejected:
             return {}
-        claim = {
-            "guarantees": {o.name: o.formula for o in job.obligations},
-            "options": job.options,
+        claim = _claim(job) | {
             "conditions": {name: [c.name for c in claim.conditions] for name, claim in experiment.claims.items()},
             "least success rate": str(experiment.at_least or experiment.floor),
         }
@@ -69,7 +82,12 @@ class ExperimentBackend(Backend):
 
     def discharge(self, job: Job, folder: Path, limits: Limits) -> Report:
         try:
-            experiment = read(job)
+            campaign = _campaign(job)
+            experiment = read(job) if campaign is None else recorded(job, campaign)
+        except NotMade as state:
+            verdict, why = state.args
+            why = f"{why}: `avow campaign {job.system.name} {job.node.name}` makes the runs"
+            return Report.alike(job, verdict, why, "avow experiment", self.version)
         except Rejected as error:
             why = f"the experiment cannot be judged: {summarized(job, error.diagnostics)}"
             return Report.alike(job, Verdict.ERROR, why, "avow experiment", self.version)
@@ -78,5 +96,15 @@ class ExperimentBackend(Backend):
             outcome, logs[f"{o.name}.tsv"] = settle(o.name, experiment, job.kept.get(o.id, ()))
             # the meaning of a part of the contract in terms of columns is a person's judgement
             link = Link.GUIDED if experiment.claims[o.name].interpreted else self.link
-            outcomes.append(replace(outcome, obligation=o.id, link=link))
+            of = self.of if campaign is None else Object.MODEL
+            outcomes.append(replace(outcome, obligation=o.id, link=link, of=of))
         return Report(tuple(outcomes), "avow experiment", self.version, logs=logs)
+
+
+def _campaign(job: Job) -> Campaign | None:
+    """Raises Rejected."""
+    return read_campaign(job, file_path(job, "data")) if "campaign" in job.options else None
+
+
+def _claim(job: Job) -> dict[str, object]:
+    return {"guarantees": {o.name: o.formula for o in job.obligations}, "options": job.options}

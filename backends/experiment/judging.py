@@ -82,6 +82,11 @@ class Judged:
     open: bool = False
     excused: bool = False
     undecided: str = ""
+    lost: str = ""
+    """How a simulator ended without a recording: counted as a failure, but no counterexample."""
+    shown: tuple[tuple[str, str], ...] = ()
+    """What the monitors show of the failure, and why it is one."""
+    why: str = ""
 
 
 def claim(clause: Clause, assumptions: Iterable[Clause], meanings: Iterable[Interpretation], known: set[str]) -> Claim:

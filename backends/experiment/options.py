@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import field
 from fractions import Fraction
-from typing import Any
 
 from avow.backend_kit.given import REASON, existing_file, file, schema, text
 from avow.backend_kit.protocol import Job
@@ -17,7 +17,8 @@ from avow.kernel.rates import Trial
 from avow.language.sorts import BOOL, REAL, Sort
 
 from .binding import WORDS, Binding, Interpretation, Unfit, bound, interpretation
-from .judging import Claim, Step, claim
+from .judging import Claim, Judged, Step, claim
+from .profile import CAMPAIGN
 from .table import Row, Table, read_table
 
 _COLUMN = text("a column")
@@ -57,6 +58,7 @@ SCHEMA = schema(
         },
         "run_column": text("the column that identifies a run (default: run, trial or id)"),
         "steps": {"type": "boolean", "description": "the rows of a run are its steps; without it, each row is a run"},
+        "campaign": CAMPAIGN,
         "strata": text("the column of the condition under which a run was made: each condition has a bound"),
         "confidence": {"type": ["number", "string"], "description": "of the bound: 0.9 or more, default 0.95"},
         "at_least": {
@@ -96,6 +98,8 @@ class Run:
     stratum: str
     rows: tuple[Mapping[str, str], ...]
     steps: tuple[Step, ...]
+    verdicts: Mapping[str, Judged] = field(default_factory=dict)
+    """Guarantee → its verdict, if monitors judged the run; `rows` is then its scenario."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,6 +119,8 @@ class Experiment:
     left_out: tuple[str, ...] = ()
     """Failing runs that the plan declares as left out of the data; `because` is the reason."""
     because: str = ""
+    replayed: tuple[Run, ...] | None = None
+    """The regressions of a campaign; None if there is no campaign."""
 
     def values(self, rows: Iterable[Mapping[str, str]]) -> tuple[Step, ...]:
         """Raises Unfit, and KeyError if a cell is missing."""
@@ -126,6 +132,15 @@ def read(job: Job) -> Experiment:
     reader = _Reader(job)
     found = reader.experiment()
     if found is None or reader.found:
+        raise Rejected(*reader.found)
+    return found
+
+
+def limits(job: Job, runs: tuple[Run, ...], claims: Mapping[str, Claim], replayed: tuple[Run, ...]) -> Experiment:
+    """A campaign's runs with the options of the claim. Raises Rejected."""
+    reader = _Reader(job)
+    found = reader.claimed(runs, claims, replayed=replayed)
+    if found is None:
         raise Rejected(*reader.found)
     return found
 
@@ -143,10 +158,6 @@ class _Reader:
         return self.job.method.options.at(*((key, entry) if entry else (key,)))
 
     def experiment(self) -> Experiment | None:
-        confidence = self._probability("confidence", Fraction(95, 100))
-        if confidence is not None and not LEAST_CONFIDENCE <= confidence < 1:
-            self.add("confidence", f"the confidence must be at least {float(LEAST_CONFIDENCE):g} and less than 1")
-        at_least, floor = self._claimed()
         table = self._table()
         if table is None:
             return None
@@ -157,21 +168,35 @@ class _Reader:
         claims = self._claims(bindings, meanings)
         named = [column for binding in bindings for column in binding.columns]
         runs = self._runs(table, named, bindings := self._read(bindings, claims))
+        return self.claimed(runs, claims, tuple(bindings))
+
+    def claimed(
+        self,
+        runs: tuple[Run, ...],
+        claims: Mapping[str, Claim],
+        bindings: tuple[Binding, ...] = (),
+        replayed: tuple[Run, ...] | None = None,
+    ) -> Experiment | None:
+        confidence = self._probability("confidence", Fraction(95, 100))
+        if confidence is not None and not LEAST_CONFIDENCE <= confidence < 1:
+            self.add("confidence", f"the confidence must be at least {float(LEAST_CONFIDENCE):g} and less than 1")
+        at_least, floor = self._claimed()
         if self.found or confidence is None:
             return None
         left_out = self.options.get("left_out", {})
         return Experiment(
             runs,
             claims,
-            tuple(bindings),
+            bindings,
             confidence,
             at_least,
             floor,
             self.options.get("strata", ""),
-            Trial.RUN if self.options.get("steps") else Trial.STEP,
+            Trial.RUN if self.options.get("steps") or replayed is not None else Trial.STEP,
             " ".join(self.options.get("protocol", "").split()),
             tuple(str(name) for name in left_out.get("runs", ())),
             " ".join(left_out.get("because", "").split()),
+            replayed,
         )
 
     def _claimed(self) -> tuple[Fraction | None, Fraction]:
@@ -331,8 +356,3 @@ def _sort(table: Table, column: str) -> Sort:
     """The sort of a column in a formula: BOOL if each cell is a word for a truth value, else REAL."""
     words = {word for word in WORDS if word.isalpha()}
     return BOOL if all(row.cells[column].casefold() in words for row in table.rows) else REAL
-
-
-def told(options: Mapping[str, Any]) -> dict[str, Any]:
-    """The options that define the claim, for the exported claim."""
-    return {key: value for key, value in options.items() if key not in ("left_out", "protocol")}

@@ -21,3 +21,19 @@ RUNS_NEEDED = 1_000_000
 CASES = 16
 """Choices of a guarantee, and ways to meet one condition, that are distinguished. Each is a stratum, which takes its
 share of the confidence."""
+
+DRAWN_STEPS = 10_000
+"""Steps of a distribution in a drawn run: more decimals than a simulator needs."""
+
+SEARCHED_STEPS = 100
+"""Steps of a number's range in a search: more make the climb along one parameter longer, fewer miss narrow faults."""
+
+CLIMB_RUNS = 100
+"""Runs of one climb, half of them drawn to find its start. For the rover of `docs/examples/rover`, 60 and 150 find its
+planted fault more seldom."""
+
+SEARCH_RUNS = 300
+"""Runs of a search, unless the command says otherwise."""
+
+SHRINKING_RUNS = 100
+"""Runs to simplify a failing one."""

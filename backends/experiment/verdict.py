@@ -48,9 +48,9 @@ def settle(name: str, experiment: Experiment, kept: Iterable[Sequence[Mapping[st
     """The outcome for a guarantee, without its obligation, and the result of each run, as tab-separated lines. `kept`:
     runs that failed before."""
     claim = experiment.claims[name]
-    found = [(run, judged(claim, run.steps)) for run in experiment.runs]
+    found = [(run, run.verdicts.get(name) or judged(claim, run.steps)) for run in experiment.runs]
     log = "".join(f"{run.name}\t{_word(claim, one)}\n" for run, one in found)
-    outcome = _outcome(claim, found, experiment)
+    outcome = _replayed(_outcome(claim, found, experiment), name, claim, experiment)
     return _held_against(outcome, claim, experiment, kept), f"run\tverdict\n{log}"
 
 
@@ -72,9 +72,7 @@ def _outcome(claim: Claim, found: Sequence[tuple[Run, Judged]], experiment: Expe
     text = f"{seen}: {_most(sample, experiment)}"
     claimed = experiment.at_least is not None and sample.bound <= 1 - experiment.at_least
     if sample.failed and not claimed:
-        details[CASE] = [{"run": run.name, "rows": list(run.rows)} for run, _ in sample.failed[:FAILURES_KEPT]]
-        shown = _counterexample(claim, sample.failed)
-        return replace(outcome, verdict=Verdict.REFUTED, summary=seen, counterexample=shown)
+        return _failed(replace(outcome, summary=seen), claim, sample.failed)
     if undecided := [(run, one) for run, one in found if one.undecided and not one.excused]:
         run, one = undecided[0]
         return replace(outcome, summary=f"run {run.name}: nobody can tell whether {one.undecided} holds")
@@ -84,7 +82,7 @@ def _outcome(claim: Claim, found: Sequence[tuple[Run, Judged]], experiment: Expe
     if sample.bound > 1 - asked:
         return replace(outcome, summary=_too_few(text, sample, experiment, asked))
     details[RATE] = [_row(stratum) for stratum in sample.strata]
-    rests = ["the runs are independent and drawn as the robot will be used", *claim.interpreted]
+    rests = [_DRAWN if experiment.replayed is None else _SIMULATED, *claim.interpreted]
     if claim.unseen:
         rests.append(f"each run meets the assumptions {', '.join(claim.unseen)}: their inputs are not in the data")
     if unfinished:
@@ -94,6 +92,40 @@ def _outcome(claim: Claim, found: Sequence[tuple[Run, Judged]], experiment: Expe
         details["failing runs"] = _counterexample(claim, sample.failed).explanation
         rests.append(f"the guarantee is meant statistically: in at least {_percent(asked)} of runs")
     return replace(outcome, verdict=Verdict.TESTED, summary=text, hypotheses=tuple(rests))
+
+
+_DRAWN = "the runs are independent and drawn as the robot will be used"
+_SIMULATED = "the robot is used as the campaign's scenario says, and behaves as in the simulator"
+
+
+def _failed(outcome: Outcome, claim: Claim, failed: Sequence[tuple[Run, Judged]]) -> Outcome:
+    """Refuted by the runs that break the guarantee; an error if the simulator only ended without recordings."""
+    if not (broken := [(run, one) for run, one in failed if not one.lost]):
+        run, one = failed[0]
+        text = f"{outcome.summary}: run {run.name} has no recording ({one.lost})"
+        return replace(outcome, verdict=Verdict.ERROR, summary=text, hypotheses=())
+    kept = [{"run": run.name, "rows": list(run.rows)} for run, _ in broken[:FAILURES_KEPT]]
+    details, shown = {**outcome.details, CASE: kept}, _counterexample(claim, broken)
+    outcome = replace(outcome, hypotheses=(), vacuous=False)
+    return replace(outcome, verdict=Verdict.REFUTED, counterexample=shown, details=details)
+
+
+def _replayed(outcome: Outcome, name: str, claim: Claim, experiment: Experiment) -> Outcome:
+    """With a campaign's regressions, which count for no rate: a failing one refutes, unless a rate is claimed."""
+    if not experiment.replayed or outcome.verdict is Verdict.REFUTED:
+        return outcome
+    found = [(run, run.verdicts[name]) for run in experiment.replayed]
+    text = f"{outcome.summary}; {count(len(found), 'regression')} replayed"
+    if failed := [(run, one) for run, one in found if one.broken is not None]:
+        names = listed([run.name for run, _ in failed], FAILURES_SHOWN)
+        outcome = replace(outcome, summary=f"{text}, {len(failed)} failed: {names}")
+        if experiment.at_least is None:
+            return _failed(outcome, claim, failed)
+        rests = f"the guarantee is meant statistically: it fails in the regressions {names}"
+        return replace(outcome, hypotheses=(*outcome.hypotheses, rests))
+    if undecided := next((run.name for run, one in found if one.undecided and not one.excused), ""):
+        return replace(outcome, verdict=Verdict.UNKNOWN, summary=f"{text}, {undecided} undecided", hypotheses=())
+    return replace(outcome, summary=f"{text}, 0 failed")
 
 
 def _sample(claim: Claim, found: Sequence[tuple[Run, Judged]], experiment: Experiment) -> _Sample:
@@ -169,6 +201,9 @@ def _too_few(text: str, sample: _Sample, experiment: Experiment, asked: Fraction
 
 def _counterexample(claim: Claim, failed: Sequence[tuple[Run, Judged]]) -> Counterexample:
     run, one = failed[0]
+    if run.verdicts:
+        about = (("run", run.name), *run.rows[0].items(), *one.shown)
+        return Counterexample(about, f"guarantee {claim.holds.name} does not hold in this simulated run: {one.why}")
     steps = [tuple((_port(name), show(value)) for name, value in step.items()) for step in run.steps]
     at = one.broken or 0
     names = listed([run.name for run, _ in failed], FAILURES_SHOWN)
@@ -184,7 +219,7 @@ def _word(claim: Claim, one: Judged) -> str:
     if one.excused:
         return "breaks an assumption"
     if one.broken is not None:
-        return "failed"
+        return one.lost or "failed"
     if one.undecided:
         return "undecided"
     if one.open:
@@ -227,16 +262,20 @@ def _held_against(
 
 
 def _fails(run: Mapping[str, Any], claim: Claim, experiment: Experiment) -> bool:
-    """Whether a kept run violates the guarantee as it is now; so does one whose cells give no values."""
+    """Whether a kept run violates the guarantee as it is now; so does one whose cells give no values, or that has to be
+    simulated again."""
     try:
-        return judged(claim, experiment.values(run["rows"])).broken is not None
+        return experiment.replayed is not None or judged(claim, experiment.values(run["rows"])).broken is not None
     except (Unfit, KeyError):
         return True
 
 
 def _is_there(kept: Mapping[str, Any], experiment: Experiment) -> bool:
-    """Whether a kept run is among the data, under its name and with the same measurements."""
-    return any(run.name == kept["run"] and _same(kept.get("rows", ()), run.rows) for run in experiment.runs)
+    """Whether a kept run is among the data, under its name and with the same measurements; in a campaign, with the same
+    seed and scenario."""
+    own = experiment.replayed is not None
+    runs = (*experiment.runs, *(experiment.replayed or ()))
+    return any((own or run.name == kept["run"]) and _same(kept.get("rows", ()), run.rows) for run in runs)
 
 
 def _same(before: Sequence[Mapping[str, str]], now: Sequence[Mapping[str, str]]) -> bool:

@@ -166,7 +166,7 @@ class RosMonitoringBackend(Backend):
 
         return steps(job, _traces(job))
 
-    def judge(self, job: Job) -> Callable[[Iterable[Mapping[str, Any]]], JudgedRun]:
+    def judge(self, job: Job) -> Callable[[Iterable[Mapping[str, Any]] | Path], JudgedRun]:
         from .runs import judge
 
         return judge(job)

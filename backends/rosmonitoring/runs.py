@@ -3,9 +3,11 @@ recording extracted."""
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 from avow import __version__
@@ -25,6 +27,7 @@ from avow.ros.bags import digest_trace
 from avow.system.graph import dataflow
 
 from .engine import Monitor
+from .judged import Judgement, ReportingMonitor
 from .lanes import signals, timeline
 from .memory import unmonitored
 from .notes import readable
@@ -169,15 +172,17 @@ def _spoken(job: Job, obligation: Obligation) -> frozenset[str]:
 ARRIVAL = Answers("arrival", "callbacks run one at a time, and what they publish is known by them")
 
 
-def judge(job: Job) -> Callable[[Iterable[Mapping[str, Any]]], JudgedRun]:
-    """As `Backend.judge`. Answers are paired with inputs by arrival, unless the options say otherwise; deadlines of the
-    wire (`fresh`, `rate`) do not apply to a generated run. Raises Rejected."""
+def judge(job: Job) -> Callable[[Iterable[Mapping[str, Any]] | Path], JudgedRun]:
+    """As `Backend.judge`. In a generated run, answers are paired with inputs by arrival, unless the options say
+    otherwise, and deadlines of the wire (`fresh`, `rate`) do not apply. Raises Rejected."""
     found = usable(job.system, job.node, job.method.options)
     used = replace(found, answers=found.answers or ARRIVAL, fresh={}, rates={}, shared={})
     names = [o.name for o in job.obligations]
     unsaid = {name: unmonitored(used, job.node.clause(name)) or "" for name in names}
 
-    def run(events: Iterable[Mapping[str, Any]]) -> JudgedRun:
+    def run(events: Iterable[Mapping[str, Any]] | Path) -> JudgedRun:
+        if isinstance(events, Path):
+            return _of_recording(job, found, events.relative_to(job.root.resolve()).as_posix())
         monitor = Monitor(used, names)
         seen = [violation for event in events for violation in monitor.step(event)]
         seen += monitor.finish()
@@ -187,6 +192,30 @@ def judge(job: Job) -> Callable[[Iterable[Mapping[str, Any]]], JudgedRun]:
         )
 
     return run
+
+
+def _of_recording(job: Job, found: Setup, name: str) -> JudgedRun:
+    """Each guarantee as if the recording were its only evidence."""
+    monitor, distances = ReportingMonitor(found, [o.name for o in job.obligations]), dict[str, float]()
+
+    def note(one: Judgement) -> None:
+        if one.margin is not None and one.verdict in ("held", "broken"):
+            distances[one.clause] = min(one.margin, distances.get(one.clause, one.margin))
+
+    monitor.report = note
+    run = _judge(job, name, [monitor], math.inf)
+    clauses, excuse = {}, _excuse(job, [run])
+    for o in job.obligations:
+        shown = Shown(o.name, [run], _spoken(job, o), excuse)
+        answer, tally, distance = outcome(o.id, shown), monitor.tallies[o.name], distances.get(o.name)
+        broken, held = answer.verdict is Verdict.REFUTED, answer.verdict is Verdict.MONITORED
+        clauses[o.name] = Judged(
+            shown.decided - tally.broken, int(broken), tally.excused, int(not broken and not held), _met(tally),
+            answer.counterexample, 0, answer.summary, tally.open > 0, distance,
+        )  # fmt: skip
+    broke = next((v for v in run.first.values() if _breaks(found, v)), None)
+    unseen = tuple(c.name for c in job.node.assumptions if not monitor.tallies[c.name].judged)
+    return JudgedRun(clauses, None if broke is None else (broke.index, f"{broke.clause}: {broke.explanation}"), unseen)
 
 
 def steps(job: Job, traces: Iterable[str]) -> Iterator[tuple[Mapping[str, Value], ...]]:
@@ -244,5 +273,8 @@ def _judged(monitor: Monitor, name: str, seen: Iterable[Violation], unsaid: str)
     lost = tally.order + tally.partial + tally.forgotten + tally.nameless
     event, reason = first.index if first is not None else 0, unsaid or tally.reason
     held, broken, undecided = tally.decided - tally.broken, tally.broken - tally.excused, tally.undecided + lost
-    met = tuple(bool(tally.met >> k & 1) for k in range(tally.conditions))
-    return Judged(held, broken, tally.excused, undecided, met, shown, event, reason)
+    return Judged(held, broken, tally.excused, undecided, _met(tally), shown, event, reason)
+
+
+def _met(tally: Tally) -> tuple[bool, ...]:
+    return tuple(bool(tally.met >> k & 1) for k in range(tally.conditions))

@@ -24,6 +24,7 @@ NO_QUESTIONS = {
     *(
         "agent run",
         "audit",
+        "campaign",
         "check",
         "diff",
         "doctor",

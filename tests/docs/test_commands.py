@@ -129,6 +129,7 @@ CODES = {"avow sanity docs/examples/ventilator/conflict.rcl": 1}
 """Other exit codes than 0."""
 
 ELSEWHERE = {
+    "avow campaign": "tests/experiment/test_campaign.py",
     "avow drive": "tests/drive/test_callbacks.py",
     "avow init robot --from-": "tests/ros/test_drafts.py",
     "avow monitor SYSTEM --serve": "tests/rosmonitoring/test_monitor_command.py talks with it",
