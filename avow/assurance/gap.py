@@ -176,15 +176,15 @@ def suggest(view: ObligationView, demand: Demand | None, facts: Facts) -> Sugges
         case Status.REFUTED:
             known = next((str(r.details["next"]) for r in view.records if "next" in r.details), "")
             text = f"repair what the counterexample of {short(view.id)} shows, or accept it with a dated reason"
-            return Suggestion(known or text, cost=-1)  # what is wrong comes before what is lacking
+            return Suggestion(known or text, cost=-2)  # what is wrong comes before what is lacking
         case Status.CONTRADICTORY:
-            return Suggestion(f"{short(view.id)}: {_two_answers(view)}", cost=-1)
+            return Suggestion(f"{short(view.id)}: {_two_answers(view)}", cost=-2)
         case Status.ERROR:
             # the same job is not run again by itself: its input has to change, or the run be fresh
             again = f"`avow verify --fresh {facts.system}`"
             failed = next((r for r in view.records if r.verdict is Verdict.ERROR), None)
             said = f" `{failed.method}`: {_clipped(failed.summary)}" if failed is not None else " the tool"
-            return Suggestion(f"repair what stopped{said}; then {again}")
+            return Suggestion(f"repair what stopped{said}; then {again}", cost=-1)
         case Status.UNWRITTEN:
             return Suggestion("replace `to_write` by what the node promises", cost=40)
         case Status.VACUOUS if hollow := [r.method for r in view.records if r.vacuous and "mutation" in r.details]:
@@ -220,7 +220,9 @@ def suggest(view: ObligationView, demand: Demand | None, facts: Facts) -> Sugges
         if record.method in used and record.verdict is Verdict.NOT_RUN:
             return Suggestion(f"let `{record.method}` run: {_clipped(record.summary)}", record.method)
         if record.method in used and record.verdict is Verdict.ERROR:
-            return Suggestion(f"repair what keeps `{record.method}` from answering: {_clipped(record.summary)}", cost=8)
+            return Suggestion(
+                f"repair what keeps `{record.method}` from answering: {_clipped(record.summary)}", cost=-1
+            )
     if demand is None:
         if view.obligation.kind is Kind.REQUIREMENT:
             return Suggestion("add what it rests on under `supported_by`, or state it as a formula", cost=20)

@@ -39,7 +39,8 @@ def gates(
     fresh: bool,
     granted: Mapping[str, Standing],
 ) -> tuple[Gate, ...]:
-    """Every gate, in the order in which a reader should look at them. `granted`: the standings of claims without the
+    """Every gate, those that fail first, in the order in which a person should see to them: what is wrong, then what is
+    lacking, the cheapest step first. `granted`: the standings of claims without the
     assumptions that the policy accepts."""
     views = {view.id: view for view in obligations}
     excused = {name for f in findings if not f.expired for name in f.obligations}
@@ -68,8 +69,15 @@ def gates(
         *rates_gate(facts.policy, requirements, views),
         *_certified(facts, proofs, fresh),
     )
-    steps = {gate.id: (Suggestion(_NEXT.get(gate.id, _EVIDENCE)),) for gate in found}
-    return tuple(g if g.passed or g.suggestions else replace(g, suggestions=steps[g.id]) for g in found)
+    known = [g if g.passed or g.suggestions else replace(g, suggestions=(_general(g.id),)) for g in found]
+    return tuple(sorted(known, key=lambda gate: (gate.passed, 0 if gate.passed else gate.suggestions[0].cost)))
+
+
+def _general(gate: str) -> Suggestion:
+    """The next step of a gate if no claim has one of its own: what is wrong first, a better kind of proof last."""
+    if gate not in _NEXT:
+        return Suggestion(_EVIDENCE, cost=30)
+    return Suggestion(_NEXT[gate], cost=70 if gate in ("proved", "certified") else -1)
 
 
 _EVIDENCE = "give each claim that fails, and what it rests on, the evidence that is asked"
@@ -81,7 +89,6 @@ _NEXT = {
     "proved": "run `avow verify`: the kernel then checks the proofs; what it cannot check, prove in smaller steps",
     "certified": "run `avow verify --fresh`",
 }
-"""The next step if no claim of a gate that fails has one of its own."""
 
 
 def _worded(view: ObligationView) -> str:
@@ -123,7 +130,7 @@ def _integrity(facts: Facts) -> Gate:
     anew = Suggestion(
         "find out who changed it; what cannot be restored is computed again once "
         f"artifacts/ledger/{facts.system}.jsonl* is deleted (the loss is told from then on)",
-        cost=50,
+        cost=-1,
     )
     return Gate("integrity", title, False, reason, tuple(d.subject for d in serious), (anew,))
 

@@ -22,7 +22,7 @@ from avow.assurance.model import Case, Derivation, MethodInfo, RunInfo, SideCond
 from avow.assurance.naming import short
 from avow.assurance.signed import KEYS, newest_signed
 from avow.backend_kit.registry import backend, names
-from avow.base.diagnostics import Rejected
+from avow.base.diagnostics import Rejected, Span
 from avow.base.files import digest_file, digest_or_missing, is_intact, read_regular, read_text, sha256, write
 from avow.base.git import head
 from avow.base.notes import read_note, write_note
@@ -39,6 +39,7 @@ from avow.evidence.signing import private_key
 from avow.evidence.status import Status
 from avow.pipeline import check as checking
 from avow.pipeline.doctor import findings
+from avow.pipeline.engine_code import report_digest
 from avow.pipeline.integrity import acknowledge, confirm, discrepancies
 from avow.pipeline.node_index import INDEX, write_indexes
 from avow.pipeline.plan_check import left_out
@@ -237,7 +238,19 @@ def _key(state: State, surveyed: Survey, basis: _Basis) -> str:
     kernel = kernel_run(entries, state.workspace.root, surveyed.system, state.run)
     graded = [kernel.parts, dict(kernel.solvers), [(one.obligation, one.solvers) for one in kernel.established]]
     tools = [[tool.name, tool.version, tool.install] for tool in _tools()]
-    told = [SCHEMA, signed, graded, surveyed.digest, keys, ledger.head, damage, str(today()), __version__, explain]
+    told = [
+        SCHEMA,
+        report_digest(),
+        signed,
+        graded,
+        surveyed.digest,
+        keys,
+        ledger.head,
+        damage,
+        str(today()),
+        __version__,
+        explain,
+    ]
     return sha256(json.dumps([*told, tools]))
 
 
@@ -258,7 +271,12 @@ def _summarise(state: State, surveyed: Survey, case: Case) -> Result:
     for g in case.gates:
         closes = [s.text for s in g.suggestions[:3]] if explain or not g.passed else []
         gates.append((g.title, g.passed, "; ".join([g.reason, *(f"next: {text}" for text in closes)])))
-    failed = [f"{short(item.claim)}: {item.text}" for item in case.open_items if item.kind == Status.ERROR.value]
+    spans = {view.id: view.obligation.span for view in case.obligations}
+    failed = [
+        f"{_place(state.workspace, spans.get(item.claim))}{short(item.claim)}: {item.text}"
+        for item in case.open_items
+        if item.kind == Status.ERROR.value
+    ]
     index = state.workspace.relative(state.workspace.report(surveyed.system.name) / "index.html")
     counts = Counter(view.status.value for view in case.obligations if not view.obligation.advisory)
     return Result(
@@ -272,6 +290,10 @@ def _summarise(state: State, surveyed: Survey, case: Case) -> Result:
         lines=tuple(terminal_lines(case)),
         failed=tuple(failed),
     )
+
+
+def _place(workspace: Workspace, span: Span | None) -> str:
+    return f"{workspace.relative(Path(span.file))}:{span.line}: " if span is not None else ""
 
 
 @dataclass(frozen=True, slots=True)

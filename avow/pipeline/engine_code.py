@@ -54,6 +54,11 @@ def reading_digest() -> str:
     return _digest((*_of(_ROOMS), _PACKAGE / "pipeline"))
 
 
+def report_digest() -> str:
+    """Digest of the code and templates behind a report, given the evidence."""
+    return _digest(_of(("assurance", "report", "evidence", "pipeline")))
+
+
 TRUSTED = {
     "parser and type checker (avow/language)": ("language",),
     "dataflow graph and plan (avow/system, avow/ros)": ("system", "ros"),

@@ -51,14 +51,14 @@ def print_summary(
     else:
         console.print(table)
     for r in results:
-        for title, passed, reason in r.gates:
-            if not passed:
-                console.print(f"[red]✗[/] {r.system}: ", end="")
-                console.print(f"{title}: {_few(reason)}", markup=False)
         more = len(r.failed) - WARNINGS
         for text in (*r.failed[:WARNINGS], *([f"and {more} more methods without an answer"] if more > 0 else [])):
             console.print(f"[yellow]![/] {r.system}: ", end="")
             console.print(printable(text), markup=False)
+        for title, passed, reason in r.gates:
+            if not passed:
+                console.print(f"[red]✗[/] {r.system}: ", end="")
+                console.print(f"{title}: {_few(reason)}", markup=False)
     for file, why in _left_out(results):
         console.print("[yellow]–[/] ", end="")
         console.print(printable(f"{file}: {why}"), markup=False)

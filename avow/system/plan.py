@@ -121,6 +121,10 @@ class Statement:
     date: str = field(default="", metadata=codec.LATER)
     """The day (ISO 8601) on which it was assumed; empty: none is given."""
     span: Span | None = field(default=None, compare=False, repr=False)
+    ends: Span | None = field(default=None, compare=False, repr=False, metadata=codec.LATER)
+    """Where `until` is."""
+    keys: str = field(default="", metadata=codec.LATER)
+    """The plan's keys that lead to it: ``compose.D1.one_output``."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -31,7 +31,7 @@ _ARGUMENTS = {"persistence": "persistence", "one_output": "one-output", "entered
 def read_statements(root: Piece) -> tuple[tuple[Statement, ...], list[Diagnostic]]:
     """Every statement of a well-shaped plan, and the faults in their words and dates."""
     faults: list[Diagnostic] = []
-    return tuple(_statement(place, piece, faults) for place, piece in _places(root)), faults
+    return tuple(_statement(*each, faults) for each in _places(root)), faults
 
 
 def without_words(system: System) -> Iterator[Diagnostic]:
@@ -42,7 +42,7 @@ def without_words(system: System) -> Iterator[Diagnostic]:
             hint = f"add  says: …  (at most {STATEMENT_WORDS} words), and  who: …, until: …"
             if not statement.because and statement.place.startswith("environment."):  # `constant: true`
                 hint = "it needs a reason of its own: write  constant: {because: …, says: …, who: …, until: …}"
-            message = f"{statement.place}: no plain words yet"
+            message = f"{statement.keys}: no plain words yet"
             yield Diagnostic("PLAN128", message, statement.span, Severity.WARNING, hint)
 
 
@@ -50,9 +50,9 @@ def expired(system: System) -> Iterator[Diagnostic]:
     """A warning for each assumption of this plan whose last day has passed."""
     for statement in system.plan.statements:
         if _own(statement, system.plan) and "" < statement.until < datetime.now().astimezone().date().isoformat():
-            text = f"{statement.place} has expired: its last day was {statement.until}"
+            text = f"{statement.keys} has expired: its last day was {statement.until}"
             hint = "decide whether it still holds, and give a new day: until: …"
-            yield Diagnostic("PLAN105", text, statement.span, Severity.WARNING, hint)
+            yield Diagnostic("PLAN138", text, statement.ends, Severity.WARNING, hint)
 
 
 def not_validated(system: System) -> Iterator[Diagnostic]:
@@ -125,40 +125,43 @@ def _own(statement: Statement, plan: Plan) -> bool:
     return statement.span is not None and statement.span.file == str(plan.path)
 
 
-def _places(root: Piece) -> Iterator[tuple[str, Piece]]:
+def _places(root: Piece) -> Iterator[tuple[str, str, Piece]]:
+    """Each statement's name, its keys in the plan, and its entry."""
     for port, _, piece in root.keyed("environment"):
         constant = piece.at("constant")
         holds = constant is not None and constant.value is not False
         if piece.at("assume") is not None or holds:
-            yield f"environment.{port}", piece
+            yield f"environment.{port}", f"environment.{port}", piece
         if piece.at("assume") is not None and constant is not None and holds:
-            yield f"environment.{port}.constant", constant  # constancy is a separate statement
+            name = f"environment.{port}.constant"
+            yield name, name, constant  # constancy is a separate statement
     for section in ("compose", "subsystems"):
         for goal, _, piece in root.keyed(section):
             for key, name in _ARGUMENTS.items():
                 argument = piece.at(key)
                 if argument is not None:
-                    yield f"{goal}.{name}", argument
+                    yield f"{goal}.{name}", f"{section}.{goal}.{key}", argument
     for name, _, piece in root.keyed("assumptions"):
-        yield f"assumptions.{name}", piece
+        yield f"assumptions.{name}", f"assumptions.{name}", piece
     for name, _, piece in root.keyed("requirements"):
         validation = piece.at("validation")
         if validation is not None:
-            yield f"requirements.{name}.validation", validation
+            yield f"requirements.{name}.validation", f"requirements.{name}.validation", validation
 
 
-def _statement(place: str, piece: Piece, faults: list[Diagnostic]) -> Statement:
+def _statement(place: str, keys: str, piece: Piece, faults: list[Diagnostic]) -> Statement:
     texts = piece.words()
     says = piece.at("says")
     if says is not None:
         number = len(texts["says"].split())
         if number > STATEMENT_WORDS:
-            message = f"{place}: says has {number} words; at most {STATEMENT_WORDS} fit a report's first screen"
+            message = f"{keys}: says has {number} words; at most {STATEMENT_WORDS} fit a report's first screen"
             faults.append(Diagnostic("PLAN115", message, says.span, hint="the whole reason is for  because"))
         names = identifiers(texts["says"])
         if names:
-            message = f"{place}: says is for readers who do not know the contract, but names {', '.join(names)}"
+            message = f"{keys}: says is for readers who do not know the contract, but names {', '.join(names)}"
             faults.append(Diagnostic("PLAN115", message, says.span, hint="say it in words"))
-    faults += wrong_words(place, piece)
+    faults += wrong_words(keys, piece)
     words = {key: texts.get(key, "") for key in ("says", "because", "who", "until", "date")}
-    return Statement(place, span=piece.span, **words)
+    ends = piece.at("until")
+    return Statement(place, span=piece.span, ends=ends.span if ends is not None else None, keys=keys, **words)

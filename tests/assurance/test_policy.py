@@ -19,6 +19,7 @@ from avow.base.verdict import Link, Object, Verdict
 from avow.evidence.obligation import Kind, Obligation
 from avow.evidence.record import ISOLATION, SIGNED_BY, SOLVER, Evidence
 from avow.evidence.status import Status
+from avow.report.short import terminal_lines
 from avow.system.plan import Finding, Located, Requirement
 
 
@@ -556,6 +557,19 @@ def test_the_first_step_is_about_what_is_refuted_and_each_names_its_claim(lesser
     assert steps[0].startswith("repair what the counterexample of n.broken shows")
     if lesser is Verdict.TESTED:
         assert steps[1] == "give the method inputs that meet the trigger of n.lacking"
+
+
+def test_the_gates_that_fail_are_in_the_order_of_what_to_do() -> None:
+    """What is wrong, then what lacks a reason, then what lacks a method: also on the terminal's last line."""
+    subject = system({"n": ["g", "h"]}, plans=[node_plan("n", "high", "hoare")])
+    claims = [guarantee("n", "g"), guarantee("n", "h"), obligation("system", Kind.COMPOSITION, "whole.one-output")]
+    records = [evidence("n.g", Verdict.TESTED, "hoare"), evidence(claims[2], Verdict.UNKNOWN, "compose")]
+    lacking = case(subject, claims, records)
+    assert [g.id for g in lacking.gates if not g.passed] == ["composition", "guarantees-high"]
+    assert terminal_lines(lacking)[-1].startswith("next: give a reason in the plan")
+    wrong = case(subject, claims, [*records, evidence("n.h", Verdict.REFUTED, "hoare")])
+    assert [g.id for g in wrong.gates if not g.passed] == ["refuted", "guarantees-high", "composition"]
+    assert terminal_lines(wrong)[-1].startswith("next: repair what the counterexample of n.h shows")
 
 
 def test_a_requirement_that_says_nothing_is_red_though_a_person_accepts_it() -> None:

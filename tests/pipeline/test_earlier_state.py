@@ -7,14 +7,17 @@ import os
 import shutil
 import subprocess
 import sys
+from itertools import pairwise
 from pathlib import Path
 
+import helpers
 import pytest
 from helpers import some
 
 from avow.evidence.envelope import Opened, unseal
 from avow.evidence.ledger import Ledger
 from avow.evidence.signing import new_key_pair
+from avow.pipeline import assess, engine_code
 from avow.pipeline.report_check import check
 
 AVOW = str(Path(sys.executable).with_name("avow"))
@@ -45,6 +48,20 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture
 def workspace(made: Path, tmp_path: Path) -> Path:
     return Path(shutil.copytree(made, tmp_path / "w"))
+
+
+def test_an_edit_of_the_reports_templates_writes_the_report_again(
+    workspace: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    page = workspace / "reports/s/index.html"
+    times = [page.stat().st_mtime_ns]
+    for digest in ("one", "one", "two"):
+        monkeypatch.setattr(assess, "report_digest", lambda digest=digest: digest)
+        assert helpers.avow("report", "s", cwd=workspace).returncode == 0
+        times.append(page.stat().st_mtime_ns)
+    assert [before != after for before, after in pairwise(times)] == [True, False, True]
+    report = Path(assess.__file__).parents[1] / "report"
+    assert any(b"templates/claims.html.j2" in part for part in engine_code._parts(report))
 
 
 def marked(root: Path) -> dict[str, set[str]]:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import io
 import json
+import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -118,6 +120,24 @@ def test_a_method_that_ended_with_an_error_is_named_though_every_gate_passes(num
     print_summary([Result("a", 0, {"monitored": 1}, "r/a/i.html", (), failed=failed)], (), (), 0, 0.1, out)
     assert out.getvalue().count("! a: n.g") == min(number, 3)
     assert ("and 2 more methods" in out.getvalue()) is (number == 5)
+
+
+@pytest.mark.slow
+def test_a_method_without_an_answer_is_told_at_its_claim_before_the_gates(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    folder = tmp_path / "contracts/s"
+    folder.mkdir(parents=True)
+    (tmp_path / "dodo.py").write_text("", "utf-8")
+    (folder / "n.rcl").write_text(
+        "node n { inputs( x : REAL ) outputs( y : REAL ) topics()\n  guarantee g ( out.y <= 1 ) }\n", "utf-8"
+    )
+    (folder / "n.py").write_text("def n(x):\n    return {}[x]\n\n\nraise OSError\n", "utf-8")
+    (folder / "plan.yaml").write_text('nodes: {n: {methods: [hypothesis: {subject: "n.py:n"}]}}\n', "utf-8")
+    words = [str(Path(sys.executable).with_name("avow")), "verify"]
+    done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, timeout=120, check=False)
+    first = next(line for line in done.stdout.splitlines() if line[:1] in "!✗" and line)
+    assert first.startswith("! s: contracts/s/n.rcl:2: n.g: ")
 
 
 def test_what_is_left_out_is_told_in_every_summary_once() -> None:

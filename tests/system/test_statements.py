@@ -78,5 +78,9 @@ def test_that_an_input_does_not_change_has_words_of_its_own(tmp_path: Path) -> N
         assert len(silent) == sum(not words for _, words in wanted)
     gone = make(tmp_path / "gone", A, entry.format(f"until: 2020-02-02, {assumed.format(own)}"))
     assert [d.message for d in expired(gone)] == ["environment.a.r has expired: its last day was 2020-02-02"]
+    late = "compose: {whole: {one_output: {because: b, until: 2020-02-02}}}"
+    (found,) = expired(make(tmp_path / "late", A, late))
+    assert (found.code, found.span and found.span.column) == ("PLAN138", late.index("2020") + 1)
+    assert found.message.startswith("compose.whole.one_output has expired")
     assert [d.code for d in faults(tmp_path / "x", A, entry.format(f"constant: {own}"))] == ["PLAN110"]
     assert [d.code for d in faults(tmp_path / "y", A, entry.format("constant: {says: It stays}"))] == ["PLAN104"]
