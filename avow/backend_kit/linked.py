@@ -13,12 +13,14 @@ from dataclasses import replace
 from fractions import Fraction
 from typing import Any
 
+from avow.backend_kit.parameters import ALONE, jobs
 from avow.backend_kit.protocol import Backend, Job, NoModel, wired
 from avow.backend_kit.registry import backend, judge_of_runs
 from avow.base.diagnostics import Rejected
 from avow.base.records import dataclass
 from avow.base.tuning.bounds import RECORDED_STEPS, ROUNDED_PART
 from avow.base.verdict import Counterexample, Outcome, Verdict
+from avow.evaluation.evaluate import evaluate
 from avow.evidence.obligation import Obligation, ProgramClaim
 from avow.evidence.record import AGREES
 from avow.formulas.values import Element, SequenceValue, Value, show
@@ -169,14 +171,16 @@ def _held(job: Job, claim: Obligation, steps: Sequence[Step], why: str) -> Outco
     agrees: dict[str, list[str]] = {}
     for method in models(job.system, job.node.name):
         try:
-            run = backend(method.backend, job.system.plan.plugins).model(
-                replace(job, method=method, obligations=(), claims=())
-            )
+            tool, of = backend(method.backend, plugins), replace(job, method=method, obligations=(), claims=())
+            asked = jobs(tool, of).get(ALONE, of)
+            given = {p.variable.qualified: evaluate(p.value, {}) for p in job.node.fixed if p.value is not None}
+            given = {} if asked.node.fixed else given  # parameters that are inputs of the model
+            run = tool.model(asked)
         except (Rejected, NoModel) as error:
             return replace(unknown, summary=f"the model of {method.id} cannot be run: {error}"[:300])
         compared, outputs = 0, set[str]()
         for step in steps:
-            answers = _said(run, step)
+            answers = _said(run, {**given, **step})
             both = [name for name in answers or () if name in step]
             if answers is None or not both:
                 unsaid += 1

@@ -11,6 +11,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 
+from avow.backend_kit.parameters import ALONE, jobs, missing, place, together
 from avow.backend_kit.protocol import Backend, Job, Limits, Report, Translated
 from avow.base.diagnostics import Diagnostic, Severity
 from avow.base.verdict import Outcome, Verdict
@@ -24,6 +25,29 @@ from avow.system.plan import System
 
 def discharge(tool: Backend, job: Job, folder: Path, limits: Limits) -> Report:
     """`Backend.discharge`; a refused guarantee is `unknown`, with the reason."""
+    each = jobs(tool, job)
+    if not each:
+        return Report.alike(job, Verdict.UNKNOWN, missing(tool, job), tool.name, tool.version)
+    if ALONE in each:
+        return _discharge(tool, each[ALONE], folder, limits)
+    reports = {
+        values: _discharge(tool, one, folder / place(k), limits) for k, (values, one) in enumerate(each.items(), 1)
+    }
+    first = next(iter(reports.values()))
+    found = {o.id: {values: _of(report, o.id) for values, report in reports.items()} for o in job.every}
+    observed = tuple(dict.fromkeys(seen for report in reports.values() for seen in report.observed))
+    isolation = min((report.isolation for report in reports.values()), key=lambda level: level.rank)
+    outcomes = tuple(together(some) for some in found.values())
+    return replace(first, outcomes=outcomes, observed=observed, isolation=isolation)
+
+
+def _of(report: Report, name: str) -> Outcome:
+    """Its outcome for an obligation."""
+    alone = [outcome for outcome in report.outcomes if outcome.obligation == name]
+    return alone[0] if len(alone) == 1 else Outcome(name, Verdict.ERROR, f"{report.tool} gave {len(alone)} answers")
+
+
+def _discharge(tool: Backend, job: Job, folder: Path, limits: Limits) -> Report:
     asked, refused = _sayable(tool, job)
     outcomes = tuple(Outcome(o.id, Verdict.UNKNOWN, refused[o.id]) for o in job.obligations if o.id in refused)
     if job.obligations and not asked.obligations:
@@ -34,13 +58,23 @@ def discharge(tool: Backend, job: Job, folder: Path, limits: Limits) -> Report:
 
 
 def export(tool: Backend, job: Job) -> Mapping[str, str]:
-    """`Backend.export`, for the clauses that the backend can express."""
-    asked, refused = _sayable(tool, job)
-    return {} if refused and not asked.obligations else tool.export(asked)
+    """`Backend.export`, for the clauses that the backend can express; with several values of parameters, in a folder
+    for each."""
+    found: dict[str, str] = {}
+    for k, (values, one) in enumerate(jobs(tool, job).items(), 1):
+        asked, refused = _sayable(tool, one)
+        files = {} if refused and not asked.obligations else tool.export(asked)
+        found |= {f"{place(k)}/{name}" if values else name: text for name, text in files.items()}
+    return found
 
 
 def check(tool: Backend, job: Job) -> Iterator[Diagnostic]:
     """`Backend.check`, and a warning for each guarantee that is refused."""
+    each = jobs(tool, job)
+    if not each:
+        yield Diagnostic("BACKEND009", missing(tool, job), job.method.options.span, Severity.WARNING)
+        return
+    job = next(iter(each.values()))
     asked, refused = _sayable(tool, job)
     for obligation in job.obligations:
         if obligation.id in refused:

@@ -14,6 +14,7 @@ import traceback
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import field, replace
+from enum import StrEnum
 from pathlib import Path
 from typing import Any, get_origin, get_type_hints
 
@@ -43,6 +44,7 @@ __all__ = [
     "JudgedRun",
     "Limits",
     "NoModel",
+    "Opens",
     "OutsideCheck",
     "Report",
     "Tool",
@@ -56,6 +58,19 @@ __all__ = [
 COMMON_OPTIONS = frozenset({"id", "guarantees", "seconds", "megabytes", "seed"})
 """Options of every method, for any backend: the pipeline reads and checks them. `id` names the method in records and
 commands, `guarantees` are those that it discharges, the others are `Limits`."""
+
+
+class Opens(StrEnum):
+    """How a method treats the parameters of a contract."""
+
+    INPUT = "input"
+    """Its program has each as an input; an assumption gives the value, if there is one."""
+    VALUES = "values"
+    """Its program is made with them: without a value in the plan, once with each of some values."""
+    ANY = "any"
+    """As any other input; one with a value is a constant."""
+    REFUSED = "refused"
+    """It needs their values."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -380,6 +395,10 @@ class Backend(ABC):
         """Whether a backend that `remembers` itself answers what it cannot express in this job: `unsaid` is then not
         called."""
         return False
+
+    def opens(self, job: Job) -> Opens:
+        """How it treats parameters. See `avow.backend_kit.one_step`."""
+        return Opens.REFUSED
 
     def check(self, job: Job) -> tuple[Diagnostic, ...]:
         """Faults of the plan's options: missing files, unknown names, models that do not parse."""

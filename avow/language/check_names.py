@@ -187,7 +187,7 @@ class Names(ABC):
         if port is None or role not in self.scope.roles:
             self.no_port(role, name, tree)
             return None
-        return Variable(role, name, port.sort, self.span(tree))
+        return port.value or Variable(role, name, port.sort, self.span(tree))
 
     def no_port(self, role: Role, name: str, tree: Syntax) -> None:
         scope = self.scope
@@ -261,7 +261,9 @@ class Names(ABC):
             return None
         roles = [Role(role_text)] if role_text else [Role.INPUT, Role.OUTPUT]
         ports = [
-            p for p in (*node.inputs, *node.outputs) if p.name == name and p.role in roles and p.role in scope.roles
+            p
+            for p in (*node.inputs, *node.fixed, *node.outputs)
+            if p.name == name and p.role in roles and p.role in scope.roles
         ]
         if not ports:
             near = did_you_mean(name, (p.name for p in (*node.inputs, *node.outputs)))
@@ -271,4 +273,4 @@ class Names(ABC):
             hint = f"write `{node_name}.in.{name}` or `{node_name}.out.{name}`"
             self.error("RCL202", f"`{name}` is both an input and an output of node `{node_name}`", tree, hint=hint)
             return None
-        return Variable(ports[0].role, f"{node_name}.{name}", ports[0].sort, self.span(tree))
+        return ports[0].value or Variable(ports[0].role, f"{node_name}.{name}", ports[0].sort, self.span(tree))

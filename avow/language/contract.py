@@ -10,7 +10,7 @@ from avow.base.diagnostics import Diagnostic, Span
 from avow.base.records import dataclass
 from avow.base.remembered import by_identity
 from avow.language.sorts import Sort
-from avow.language.terms import TRUE, History, Limit, Past, Role, Term, Variable
+from avow.language.terms import TRUE, Compare, History, Limit, Past, Role, Term, Variable
 
 TO_WRITE = "to_write"
 """The name that a draft gives to a guarantee that a person has yet to write."""
@@ -60,10 +60,28 @@ class Port:
     sort: Sort
     type_name: str
     span: Span | None = field(default=None, compare=False, repr=False)
+    parameter: bool = False
+    """Whether it is an input that has one value during a run."""
+    value: Term | None = None
+    """The value of a parameter, if the plan gives one."""
 
     @property
     def variable(self) -> Variable:
         return Variable(self.role, self.name, self.sort)
+
+    @property
+    def declared(self) -> str:
+        """``in.r``, ``in.limit (parameter)``: for digests."""
+        return self.variable.qualified + " (parameter)" * self.parameter
+
+    @property
+    def constancy(self) -> Clause:
+        """The assumption that a parameter keeps its value."""
+        v = self.variable
+        same = Compare("==", v, History(Past.PREVIOUS, (v, v), self.sort))
+        said = f"The parameter {self.name} keeps its value during a run"
+        text = f"{v.qualified} == previous({v.qualified}, {v.qualified})"
+        return Clause(ClauseKind.ASSUMPTION, f"{self.name}_constant", 0, same, said, text, self.span, written=same)
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,6 +128,20 @@ class Node:
     """Generated to merge several outputs into one input; not from a contract."""
     definitions: tuple[Definition, ...] = field(default=(), compare=False, repr=False)
     """The definitions that its clauses may use by name; they are expanded in every formula."""
+    fixed: tuple[Port, ...] = field(default=(), compare=False, repr=False)
+    """The parameters with a value in the plan: they are no inputs, and the value stands for them in every formula."""
+
+    @property
+    def parameters(self) -> tuple[Port, ...]:
+        """The inputs that are parameters."""
+        return tuple(port for port in self.inputs if port.parameter)
+
+    @property
+    def implied(self) -> frozenset[str]:
+        """The names of the assumptions that follow from a declaration: they are not written in the contract."""
+        own = {clause.name: clause.formula for clause in self.assumptions}
+        said = (port.constancy for port in self.parameters)
+        return frozenset(clause.name for clause in said if own.get(clause.name) == clause.formula)
 
     @property
     def clauses(self) -> tuple[Clause, ...]:

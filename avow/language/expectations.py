@@ -56,7 +56,7 @@ def explain(
     start: str, tokens: Sequence[Token], at: int, found: Token, expected: frozenset[str], reports: Reports
 ) -> None:
     """Report the token `found` at position `at`, where one of the terminals `expected` should be."""
-    if expected == {"COLON", "COMMA"}:  # after a port's name, its type is usually missing
+    if {"COLON", "COMMA"} <= expected <= {"COLON", "COMMA", "NAME"}:  # after a port's name, its type is usually missing
         expected = frozenset({"COLON"})
     if expected == {"NAME", "DEFINE"}:  # at the start of a declaration, the name is usually missing
         expected = frozenset({"NAME"})
@@ -75,7 +75,7 @@ def explain(
 def _expected(start: str, expected: frozenset[str]) -> str:
     if expected >= _TERM:
         return "a formula" if "NOT" in expected else "a term"
-    if start in ("declaration", "ports") and {"NAME", "BUILTIN"} <= expected:
+    if start in ("declaration", "ports", "given") and {"NAME", "BUILTIN"} <= expected:
         return "a type"
     words = {kind: _WORDS.get(kind, f"`{kind.lower()}`") for kind in expected - {"$END"}}
     if "ARROW" in expected and "NAME" in words:

@@ -223,7 +223,7 @@ def _about_node(node: Node) -> Iterator[Diagnostic]:
             hint = f"write `{topic.name} matches({near.role}.{near.name})`" if near is not None else None
             message = f"no variable of `{node.name}` matches the topic `{topic.name}`"
             yield _warning("RCL404", message, topic.span, hint or "write `matches(in.…)` or `matches(out.…)`")
-    silent = [p for p in ports if (p.role, p.name) not in matched]
+    silent = [p for p in ports if (p.role, p.name) not in matched and not p.parameter]
     if node.topics:
         for port in silent:
             message = uncarried(node.name, f"{port.role}.{port.name}")

@@ -233,7 +233,7 @@ def _is_whole(node: Node, written: NodeSyntax) -> bool:
     return (
         not written.broken
         and all(tree is not None and len(found) == len(tree.items) for found, tree in lists)
-        and len(node.clauses) == len(written.clauses)
+        and len(node.clauses) - len(node.implied) == len(written.clauses)
     )
 
 
@@ -351,7 +351,7 @@ def _checker(
     if node is None:
         scope.nodes = {n.name: n for n in contract.nodes}
     else:
-        scope.inputs = {p.name: p for p in node.inputs}
+        scope.inputs = {p.name: p for p in (*node.inputs, *node.fixed)}
         scope.outputs = {p.name: p for p in node.outputs}
         scope.node = node.name
     return Checker(scope, reports)

@@ -16,13 +16,17 @@ from avow.language.flat import flat_text
 from avow.language.lexer import Token, unquote
 from avow.language.printer import show_type
 from avow.language.scope import Defined, Scope
+from avow.language.sorts import BoolSort, EnumSort, IntegerSort, NaturalSort, RealSort, Sort, StringSort
 from avow.language.source import Reports
-from avow.language.subterms import sort_extent, term_extent
-from avow.language.syntax import ClauseSyntax, NodeSyntax, RosType, UnspecifiedType
+from avow.language.subterms import histories, sort_extent, term_extent
+from avow.language.syntax import ClauseSyntax, NodeSyntax, PortDeclaration, RosType, UnspecifiedType
 from avow.language.terms import Role, Term
 from avow.ros.calls import part_topic
 from avow.ros.names import is_name
 
+PARAMETER = "parameter"
+ONE_VALUE = (BoolSort, EnumSort, IntegerSort, NaturalSort, RealSort, StringSort)
+"""The sorts of parameters."""
 ROS_BUILTINS = (
     *("bool", "byte", "char", "string", "wstring", "time", "duration", "float32", "float64"),
     *(f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64)),
@@ -49,9 +53,24 @@ def check_ports(
                 continue
             written = flat_text(reports.source.text[part.type.start : part.type.end])
             type_name = show_type(sort) if isinstance(part.type, UnspecifiedType) else written
-            ports[name.text] = Port(role, name.text, sort, type_name, reports.source.span(name.start, name.end))
+            span = reports.source.span(name.start, name.end)
+            ports[name.text] = Port(role, name.text, sort, type_name, span, _is_parameter(part, sort, reports))
         found.append(ports)
     return found[0], found[1]
+
+
+def _is_parameter(part: PortDeclaration, sort: Sort, reports: Reports) -> bool:
+    """Whether an input is declared as a parameter; other words before its name, and other types, are reported."""
+    marker = part.marker
+    if marker is None:
+        return False
+    if marker.text != PARAMETER:
+        hint = f"an input with one value during a run is written `{PARAMETER} {part.name.text} : TYPE`"
+        reports.error("RCL221", f"`{marker.text}` before an input means nothing", marker.start, marker.end, hint=hint)
+    elif not isinstance(sort, ONE_VALUE):
+        message = f"a parameter is a number, a truth value, a text or an element, and not {show_type(sort)}"
+        reports.error("RCL221", message, part.type.start, part.type.end)
+    return True
 
 
 def check_node(
@@ -76,6 +95,9 @@ def check_node(
         clause = _clause(syntax, counts[syntax.kind], scope, seen, reports)
         if clause is not None:
             clauses[syntax.kind].append(clause)
+    if any(histories(clause.formula) for some in clauses.values() for clause in some):  # of one step, it says nothing
+        kept = (port.constancy for port in inputs.values() if port.parameter)
+        clauses[ClauseKind.ASSUMPTION] += [c for c in kept if c.name not in seen]
     return Node(
         node.name.text,
         tuple(inputs.values()),
@@ -212,6 +234,10 @@ def _matched(role_text: str | None, name: Token, scope: Scope, reports: Reports)
     text = name.text
     roles = [Role(role_text)] if role_text else [Role.INPUT, Role.OUTPUT]
     candidates = [scope.ports(r)[text] for r in roles if text in scope.ports(r)]
+    if len(candidates) == 1 and candidates[0].parameter:
+        message = f"`{text}` is a parameter: no topic carries it"
+        reports.error("RCL218", message, name.start, name.end, hint="leave the topic out, or make it a plain input")
+        return None
     if len(candidates) == 1:
         return candidates[0]
     if scope.is_broken(text):

@@ -8,6 +8,7 @@ even if a bracket before them was never closed.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Literal
 
 from avow.base.suggestions import nearest
 from avow.language.contract import ClauseKind
@@ -387,7 +388,8 @@ class _OutlineReader:
                 listing = topics = parse("topics", part, self.reports, end, opening.end)
                 node.topics = node.topics or topics
             else:
-                listing = ports = parse("ports", part, self.reports, end, opening.end)
+                start: Literal["given", "ports"] = "given" if section == "INPUTS" else "ports"
+                listing = ports = parse(start, part, self.reports, end, opening.end)
                 if section == "INPUTS":
                     node.inputs = node.inputs or ports
                 else:

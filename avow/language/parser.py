@@ -7,6 +7,7 @@ It is iterative: no nesting, however deep, can exhaust the stack.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, Literal, TypeVar, overload
@@ -20,7 +21,7 @@ from avow.language.source import Reports
 from avow.language.terms import Quantifier
 
 QUANTIFIERS = {"FORALL": Quantifier.FORALL, "EXISTS": Quantifier.EXISTS, "UNIQUE": Quantifier.UNIQUE}
-STARTS = ("declaration", "ports", "topics", "formula")
+STARTS = ("declaration", "ports", "given", "topics", "formula")
 
 
 @overload
@@ -31,7 +32,7 @@ def parse(
 
 @overload
 def parse(
-    start: Literal["ports"], tokens: Sequence[Token], reports: Reports, end: int, begin: int | None = None
+    start: Literal["ports", "given"], tokens: Sequence[Token], reports: Reports, end: int, begin: int | None = None
 ) -> syntax.PortList | None: ...
 
 
@@ -172,6 +173,8 @@ _CALLBACKS: dict[str, Callable[[list[Any]], Any]] = {
     "constant_declaration": lambda c: _made(syntax.ConstantDeclaration, c, c[0], c[2]),
     "definition": lambda c: _made(syntax.Define, c, c[1], c[3].items if len(c) > 4 else (), c[-1]),
     "ports": _port_list,
+    "given": _port_list,
+    "parameter": lambda c: tuple(replace(port, marker=c[0]) for port in c[1]),
     "port": lambda c: tuple(_made(syntax.PortDeclaration, (name, c[-1]), name, c[-1]) for name in c[:-2:2]),
     "topics": lambda c: _made(syntax.TopicList, c, tuple(c[::2])) if c else syntax.TopicList(0, 0, 1, ()),
     "topic": lambda c: _made(

@@ -358,8 +358,11 @@ class ConstantDeclaration(_Placed):
 
 @dataclass(frozen=True, slots=True)
 class PortDeclaration(_Placed):
+    """``r : REAL``, or ``parameter r : REAL`` with the word `parameter` as its `marker`."""
+
     name: Token
     type: TypeSyntax
+    marker: Token | None = None
 
 
 @dataclass(frozen=True, slots=True)

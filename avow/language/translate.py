@@ -19,6 +19,7 @@ from avow.language.definitions import show_clause
 from avow.language.format import format_text
 from avow.language.lexer import quote
 from avow.language.load import check_text
+from avow.language.nodes import PARAMETER
 from avow.language.printer import show_sort, show_term, show_type
 from avow.language.sorts import BOOL, BUILTINS, Constructor
 from avow.language.styles import StyleName, latex_escape, latex_name
@@ -38,13 +39,13 @@ def to_rcl(contract: Contract) -> str:
     for node in contract.nodes:
         out += [f"node {node.name} {{"]
         for word, ports in (("inputs", node.inputs), ("outputs", node.outputs)):
-            shown = ", ".join(f"{p.name} : {p.type_name}" for p in ports)
+            shown = ", ".join(f"{_called(p)} : {p.type_name}" for p in ports)
             out.append(f"  {word}( {shown} )" if shown else f"  {word}()")
         topics = ",\n          ".join(_topic(t) for t in node.topics)
         out.append(f"  topics( {topics} )" if topics else "  topics()")
         out += [f"  {show_term(c.formula, 'rcl')}" for c in node.guarantees if _is_own_section(c)]
         for clause in node.clauses:
-            if _is_own_section(clause):
+            if _is_own_section(clause) or clause.name in node.implied:
                 continue
             word = "assume" if clause in node.assumptions else "guarantee"
             out.append(f"  {word}{_head(clause)}( {show_term(clause.formula, 'rcl')} )")
@@ -91,6 +92,10 @@ def _value(term: Term) -> str:
     return f"({shown})" if bare else shown
 
 
+def _called(port: Port) -> str:
+    return f"{PARAMETER} {port.name}" if port.parameter else port.name
+
+
 def _head(clause: Clause) -> str:
     letter = "A" if clause.kind == "assumption" else "G"
     name = "" if clause.name == f"{letter}{clause.position}" else f" {clause.name}"
@@ -117,7 +122,7 @@ def _for_people(contract: Contract, style: StyleName) -> str:
     for node in contract.nodes:
         out.append(f"Node {node.name}")
         for word, ports in (("Inputs", node.inputs), ("Outputs", node.outputs)):
-            out.append(f"  {word}: {', '.join(f'{p.name} : {p.type_name}' for p in ports) or 'none'}")
+            out.append(f"  {word}: {', '.join(f'{_called(p)} : {p.type_name}' for p in ports) or 'none'}")
         if node.topics:
             out.append("  Topics")
             out += [f"    {_topic(t)}" for t in node.topics]
@@ -169,7 +174,8 @@ def _node(node: Node) -> dict[str, Any]:
 
 
 def _port(port: Port) -> dict[str, Any]:
-    return {"name": port.name, "type": port.type_name, "sort": _data(port.sort)}
+    parameter = {"parameter": True} if port.parameter else {}
+    return {"name": port.name, "type": port.type_name, "sort": _data(port.sort)} | parameter
 
 
 def _clause(clause: Clause) -> dict[str, Any]:
@@ -252,7 +258,9 @@ def _node_table(node: Node) -> str:
 
 
 def _port_rows(word: str, ports: tuple[Port, ...]) -> Iterable[str]:
-    shown = r",\quad ".join(f"${latex_name(p.name)} : {_type(p)}$" for p in ports) or "none"
+    words = (r"\textbf{parameter} " if p.parameter else "" for p in ports)
+    names = (f"${latex_name(p.name)} : {_type(p)}$" for p in ports)
+    shown = r",\quad ".join(map("".join, zip(words, names, strict=True))) or "none"
     yield rf"{word} & \textbf{{FOL}} & {shown} \\ \hline\hline"
 
 

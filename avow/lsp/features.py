@@ -205,7 +205,7 @@ def _plain(text: str) -> str:
 
 
 def _about_port(port: Port, node: Node) -> str:
-    words = {"in": "input", "out": "output"}
+    words = {"in": "parameter" if port.parameter else "input", "out": "output"}
     shown = show_type(port.sort)
     more = f" = `{shown}`" if shown != port.type_name else ""
     topics = [t for t in node.topics if t.port == port]

@@ -94,6 +94,7 @@ def surroundings(tool: Backend, job: Job, options: str, files: Iterable[Path] | 
     constants += sorted(
         [d.name, digest(d.body), *(f"{p.name} {sort_digest(p.sort)}" for p in d.parameters)] for d in definitions
     )
+    constants += sorted([f"in.{p.name}", digest(p.value)] for p in job.node.fixed if p.value is not None)
     types = sorted([name, sort_digest(sort)] for name, sort in named.types(job.contract))
     parts: list[Any] = [_ports(job.node), _settled_together(job), sorted(named.others(job)), constants, types]
     scenario = job.system.plan.scenario
@@ -107,6 +108,7 @@ def surroundings(tool: Backend, job: Job, options: str, files: Iterable[Path] | 
         texts = (declared.python, declared.class_name, declared.cpp, declared.parameters, declared.numbers.value)
         kind = [] if declared.kind is Driving.STEP else [declared.kind.value]
         parts.append(["source", *texts, *kind, sorted(declared.memory.items())])
+        parts += [repr(sorted(declared.values.items()))] if declared.values else []
         parts += sorted([clause.name, digest(clause.formula)] for clause in job.begins)
     if tool.uses_criticality:
         parts.append(["criticality", job.system.plan.node(job.node.name).criticality])
@@ -121,7 +123,7 @@ def _settled_together(job: Job) -> list[list[str]]:
 
 
 def _ports(node: Node) -> list[list[str]]:
-    return sorted([p.variable.qualified, sort_digest(p.sort)] for p in (*node.inputs, *node.outputs))
+    return sorted([p.declared, sort_digest(p.sort)] for p in (*node.inputs, *node.outputs))
 
 
 def _wiring(system: System, node: Node, backends: Collection[str]) -> list[Any]:

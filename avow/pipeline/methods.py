@@ -61,7 +61,7 @@ _CLAIMED = {
 @by_identity(50_000)
 def _program_claim(system: System, node: Node, name: ProgramClaim) -> Obligation:
     """A claim about the node's program: its meaning depends on the node's ports and assumptions."""
-    ports = sorted((p.variable.qualified, sort_digest(p.sort)) for p in (*node.inputs, *node.outputs))
+    ports = sorted((p.declared, sort_digest(p.sort)) for p in (*node.inputs, *node.outputs))
     assumed = sorted(digest(clause.formula) for clause in node.assumptions)
     meaning = sha256(json.dumps([name, ports, assumed]))
     claim = f"The program of {node.name} {_CLAIMED[name]}"

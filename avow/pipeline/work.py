@@ -300,7 +300,7 @@ def texts_digest(system: System) -> str:
 def _contract_digest(contract: Contract) -> str:
     parts: list[list[str]] = [[name, sort_digest(sort)] for name, sort in contract.types]
     for node in contract.nodes:
-        parts.append([node.name, *(f"{p.role}.{p.name}:{sort_digest(p.sort)}" for p in node.inputs + node.outputs)])
+        parts.append([node.name, *(f"{p.declared}:{sort_digest(p.sort)}" for p in node.inputs + node.outputs)])
         parts += [[node.name, c.kind, c.name, node_digest(node, c)] for c in node.clauses]
     return sha256(json.dumps(sorted(parts)))  # the order of declarations means nothing
 

@@ -115,7 +115,7 @@ def claims(node: Node) -> tuple[Claim, ...]:
         excluded = f"The guarantees of {node.name} exclude some value of out.{port.name}."
         ask(Property.CONSTRAINED, port, excluded, g, guaranteed)
         ask(Property.DETERMINED, port, f"The inputs of {node.name} determine out.{port.name}.", g, guaranteed)
-    for clause in (c for c in node.assumptions if c.formula != TRUE):
+    for clause in (c for c in node.assumptions if c.formula != TRUE and c.name not in node.implied):
         ask_of(clause)
     return tuple(found)
 
@@ -124,7 +124,7 @@ def claims(node: Node) -> tuple[Claim, ...]:
 def node_key(node: Node) -> str:
     """SHA-256 of everything that the answers depend on: clauses by name and meaning, ports by name and sort."""
     clauses = sorted([str(c.kind), c.name, digest(c.formula)] for c in node.clauses)  # their order does not matter
-    ports = [[p.variable.qualified, sort_digest(p.sort)] for p in (*node.inputs, *node.outputs)]
+    ports = [[p.declared, sort_digest(p.sort)] for p in (*node.inputs, *node.outputs)]
     return sha256(json.dumps([clauses, ports]))
 
 

@@ -253,7 +253,7 @@ def _by_names(
     for node in nodes:
         for port in node.inputs:
             target = Endpoint(node.name, port.name)
-            if port.name not in outputs or node.relay:
+            if port.name not in outputs or node.relay or port.parameter:
                 continue
             others = [(name, output) for name, output in outputs[port.name] if name != node.name]
             if target in taken:

@@ -96,7 +96,7 @@ def _parameters(plan: Plan, node: Node, launched: Started) -> Iterator[Diagnosti
     if wrong:
         return  # reported where the class is examined
     here = dict(flat(mine))
-    there, unread = _started_with(launched)
+    there, unread = started_with(launched)
 
     def place(name: str) -> Span:
         return parameter_place(plan.root, source, launched.name, name)
@@ -116,7 +116,7 @@ def _parameters(plan: Plan, node: Node, launched: Started) -> Iterator[Diagnosti
         yield Diagnostic("ROS127", message, place(name), hint="leave it out, or launch with it")
 
 
-def _started_with(launched: Started) -> tuple[dict[str, tuple[Any, Span]], tuple[Diagnostic, ...]]:
+def started_with(launched: Started) -> tuple[dict[str, tuple[Any, Span]], tuple[Diagnostic, ...]]:
     """The parameters that a launch file certainly sets for a node, and those that it sets but that are not read."""
     there: dict[str, tuple[Any, Span]] = {}
     unread: list[Diagnostic] = []
@@ -180,7 +180,7 @@ def told(system: System) -> Iterator[Diagnostic]:
                 runs.append((said, one.span))
             source = next((entry.source for entry in system.plan.nodes if entry.node == node.name), None)
             if source and source.python and not parameters(system.plan.root, source, one.name)[1]:
-                yield from _started_with(one)[1]  # else the same file may be reported for its own faults
+                yield from started_with(one)[1]  # else the same file may be reported for its own faults
         elif not node.relay and node.name not in (*model.get("compound", {}), *model.get("external", {})):
             message = f"no launch file starts {node.name}"
             names = list(dict.fromkeys(s.name for s in launched.nodes if s.name))

@@ -72,7 +72,7 @@ def _promised(node: Node, name: str | None = None) -> Iterator[str]:
 def _placed(node: Node, plan: Plan) -> Iterator[str]:
     """A node's ports, and what is connected to its inputs."""
     for port in (*node.inputs, *node.outputs):
-        yield repr((node.name, port.role.name, port.name, show_sort(port.sort)))
+        yield repr((node.name, port.role.name, port.name + " (parameter)" * port.parameter, show_sort(port.sort)))
     for topic in node.topics:
         yield repr((node.name, topic.name, topic.port.variable.qualified if topic.port else ""))
     for edge in plan.connections:

@@ -17,6 +17,7 @@ from avow.system.include import include, still_open
 from avow.system.launched import started
 from avow.system.links import completed
 from avow.system.names import check_names
+from avow.system.parameters import with_parameters
 from avow.system.plan import Plan, System
 from avow.system.plan_file import bare_plan, read_plan
 from avow.system.strict_yaml import Piece
@@ -104,6 +105,8 @@ def _linked(
         raise Rejected(*faults)
     plan, more = started(plan, contract)
     faults += more
+    plan, contract, more = with_parameters(plan, contract)
+    faults += more
     if any(fault.is_error for fault in faults):
         raise Rejected(*faults)
     plan, contract, more = heard(plan, contract)
@@ -130,6 +133,7 @@ def load_bare(files: Sequence[Path], name: str | None = None, shelf: Shelf | Non
     if contract is None:
         raise Rejected(*faults)
     plan = bare_plan(name or (files[0].stem if files else "system"), tuple(files))
+    plan, contract, _ = with_parameters(plan, contract)
     plan, contract, wrong = heard(plan, contract)
     if wrong:
         raise Rejected(*wrong)

@@ -67,7 +67,7 @@ def _connections(plan: Plan, root: Piece, nodes: dict[str, Node]) -> Iterator[Di
                     yield _unknown(f"{where}: node", name, nodes, item.span)
                     continue
                 ports = nodes[name].outputs if side == "output" else nodes[name].inputs
-                if port not in [p.name for p in ports]:
+                if port not in [p.name for p in ports if not p.parameter]:
                     yield _unknown(f"{where}: {side}", item.text, [f"{name}.{p.name}" for p in ports], item.span)
 
 

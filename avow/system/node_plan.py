@@ -102,6 +102,7 @@ def read_source(name: str, node: Piece) -> tuple[Source | None, tuple[Diagnostic
         held,
         node.located(),
         Driving(texts.get("kind", "step")),
+        {name: part.value for name, _, part in node.keyed("parameters")},
     )
     return found, tuple(faults)
 
@@ -136,16 +137,23 @@ def check_memory(plan: Plan, nodes: dict[str, Node]) -> Iterator[Diagnostic]:
 
 
 def parameters(root: Path, source: Source, name: str) -> tuple[Mapping[str, Any], tuple[Diagnostic, ...]]:
-    """The parameters of the class; from a ROS 2 parameter file, those set for the node of this whole name. YAML that
-    another reader may interpret differently is rejected."""
+    """The parameters of the class: the plan's own, and those of its file (if that is a ROS 2 parameter file, those set
+    for the node of this whole name). YAML that another reader may interpret differently is rejected."""
     if not source.parameters:
-        return {}, ()
+        return nested(source.values), ()
     try:
         values, found = _settings(root, source, name)
     except Rejected as rejected:
         return {}, rejected.diagnostics
     told = ((_unclear(piece, value, key), piece.span) for key, (value, piece) in found.items())
-    return values, tuple(Diagnostic("PLAN130", f"`{source.parameters}`: {why}", span) for why, span in told if why)
+    wrong = [Diagnostic("PLAN130", f"`{source.parameters}`: {why}", span) for why, span in told if why]
+    own = source.values
+    for key in sorted(own.keys() & found.keys()):
+        value, piece = found[key]
+        if own[key] != value or isinstance(own[key], bool) is not isinstance(value, bool):
+            message = f"the plan sets {key} to {own[key]!r}, and `{source.parameters}` to {value!r}"
+            wrong.append(Diagnostic("PLAN139", message, piece.span))
+    return nested({**{key: value for key, (value, _) in found.items()}, **own}) if own else values, tuple(wrong)
 
 
 def parameter_place(root: Path, source: Source, name: str, key: str) -> Span:

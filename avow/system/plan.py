@@ -230,6 +230,8 @@ class Source:
     """Port → attribute, without ``self.``."""
     place: Located = field(default=NOWHERE, compare=False, repr=False)
     kind: Driving = Driving.STEP
+    values: Mapping[str, Any] = field(default_factory=dict)
+    """The parameters that the plan itself sets for the node."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -241,6 +243,8 @@ class NodePlan:
     title: str = ""
     """Its name in a report's first screen; empty: its name in the contract, split into words."""
     source: Source | None = None
+    parameters: Located = NOWHERE
+    """The parameters that the plan itself sets, by name."""
 
 
 @dataclass(frozen=True, slots=True)

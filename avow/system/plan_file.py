@@ -21,6 +21,7 @@ from avow.system.hazards import read_hazards
 from avow.system.launched import in_workspace, read_launched
 from avow.system.node_plan import files_of, read_methods, read_source
 from avow.system.plan import (
+    NOWHERE,
     ComposeGoal,
     Edge,
     Endpoint,
@@ -357,7 +358,9 @@ class _PlanReader:
             methods = self.noted(read_methods(name, piece))
             level = piece.said("criticality") or "medium"
             words = " ".join((piece.said("title") or "").split())
-            yield NodePlan(name, level, methods, piece.span, words, self.source(name, piece))
+            values = piece.at("parameters")
+            given = NOWHERE if values is None else values.located()
+            yield NodePlan(name, level, methods, piece.span, words, self.source(name, piece), given)
 
     def source(self, name: str, piece: Piece) -> Source | None:
         found = self.noted(read_source(name, piece))

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from avow.backend_kit.given import existing_file, file, file_path, schema, summarized
 from avow.backend_kit.one_step import unsaid
-from avow.backend_kit.protocol import Backend, Job, Limits, OutsideCheck, Report, Tool, Translated
+from avow.backend_kit.protocol import Backend, Job, Limits, Opens, OutsideCheck, Report, Tool, Translated
 from avow.base import process
 from avow.base.codes import Catalogue
 from avow.base.diagnostics import Diagnostic, Rejected, Severity, Span
@@ -60,6 +60,9 @@ class DafnyBackend(Backend):
 
     def unsaid(self, node: Node, clause: Clause) -> str | None:
         return unsaid(self.name, node, clause)
+
+    def opens(self, job: Job) -> Opens:
+        return Opens.INPUT
 
     def check(self, job: Job) -> tuple[Diagnostic, ...]:
         from .printer import NotExpressible

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from avow.backend_kit.given import file_path, summarized
 from avow.backend_kit.one_step import unsaid
-from avow.backend_kit.protocol import Backend, Job, Limits, Report
+from avow.backend_kit.protocol import Backend, Job, Limits, Opens, Report
 from avow.base.codec import document
 from avow.base.codes import Catalogue
 from avow.base.diagnostics import Diagnostic, Rejected
@@ -44,6 +44,9 @@ class ExperimentBackend(Backend):
 
     def unsaid(self, node: Node, clause: Clause) -> str | None:
         return unsaid(self.name, node, clause)
+
+    def opens(self, job: Job) -> Opens:
+        return Opens.ANY
 
     def check(self, job: Job) -> tuple[Diagnostic, ...]:
         try:

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from avow.backend_kit.given import NAN, schema, whole_number
-from avow.backend_kit.protocol import Backend, Job, Limits, Report, Tool
+from avow.backend_kit.protocol import Backend, Job, Limits, Opens, Report, Tool
 from avow.base.codes import Catalogue
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.verdict import Link, Object, Verdict
@@ -49,6 +49,9 @@ class FuzzBackend(Backend):
         from .clang_tool import tools
 
         return tools()
+
+    def opens(self, job: Job) -> Opens:
+        return Opens.VALUES
 
     def check(self, job: Job) -> tuple[Diagnostic, ...]:
         from .reading import load

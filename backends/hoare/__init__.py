@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 
 from avow.backend_kit.one_step import unsaid
-from avow.backend_kit.protocol import Backend, Job, Limits, OutsideCheck, Report, Tool
+from avow.backend_kit.protocol import Backend, Job, Limits, Opens, OutsideCheck, Report, Tool
 from avow.base.codes import Catalogue
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.packaged import packaged
@@ -47,6 +47,9 @@ class Hoare(Backend):
 
     def unsaid(self, node: Node, clause: Clause) -> str | None:
         return unsaid(self.name, node, clause, functions=True)
+
+    def opens(self, job: Job) -> Opens:
+        return Opens.INPUT
 
     def check(self, job: Job) -> tuple[Diagnostic, ...]:
         from .backend import problems

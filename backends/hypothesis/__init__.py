@@ -9,7 +9,7 @@ from pathlib import Path
 
 from avow.backend_kit.given import READING, file, schema, whole_number
 from avow.backend_kit.one_step import unsaid
-from avow.backend_kit.protocol import Backend, Job, Limits, OutsideCheck, Report, Tool
+from avow.backend_kit.protocol import Backend, Job, Limits, Opens, OutsideCheck, Report, Tool
 from avow.base.codes import Catalogue
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.tools import works
@@ -61,6 +61,9 @@ class HypothesisBackend(Backend):
         from .callbacks import wanted
 
         return wanted(job)
+
+    def opens(self, job: Job) -> Opens:
+        return Opens.VALUES if job.options.get("subject") is None else Opens.ANY
 
     def check(self, job: Job) -> tuple[Diagnostic, ...]:
         from .backend import problems

@@ -18,6 +18,7 @@ from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.plain import ALLOWS_MORE
 from avow.base.process import Completed, ToolMissing
 from avow.base.verdict import Counterexample, Object, Outcome, Verdict, bound
+from avow.evaluation.evaluate import evaluate
 from avow.evidence.obligation import Obligation
 from avow.evidence.record import CASE, RETRY
 from avow.isolation import judge
@@ -107,6 +108,7 @@ def _question(job: Job) -> Question:
         source=unit.source,
         held=unit.held,
         accepted=unit.accepted,
+        constants={p.name: evaluate(p.value, {}) for p in export.constants(job, unit) if p.value is not None},
         cases=export.cases(job),
         length=export.run_length([c.formula for c in (*job.node.assumptions, *guarantees)]),
         numbers=export.numbers(job),

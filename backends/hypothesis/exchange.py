@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from avow.base.verdict import Isolation
+from avow.formulas.values import Value
 from avow.isolation.observed import Observed
 from avow.language.contract import Clause, Port
 
@@ -32,6 +33,8 @@ class Question:
     """The unit under test is the node's own class."""
     held: Mapping[str, str]
     accepted: frozenset[str] | None
+    constants: Mapping[str, Value]
+    """The values of parameters that it takes as arguments."""
     cases: int
     length: int
     """Steps of a run."""

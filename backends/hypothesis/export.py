@@ -100,6 +100,11 @@ def port_names(ports: Sequence[Port]) -> dict[str, str]:
     return found
 
 
+def constants(job: Job, subject: SubjectFile) -> tuple[Port, ...]:
+    """The parameters with values that the unit takes as arguments."""
+    return () if subject.source else tuple(p for p in job.node.fixed if subject.takes(p.name))
+
+
 @dataclass(slots=True)
 class _Test:
     job: Job
@@ -279,7 +284,8 @@ class _Test:
         given = [p for p in self.inputs if p.name not in self.subject.memory]
         taken = [p for p in given if self.subject.takes(p.name)]
         direct = not self.doubles and all(p.name == self.names[p.name] for p in taken)
-        called = ", ".join(f"{p.name}={p.name}" for p in taken) if direct else "**inputs"
+        fixed = [f"{p.name}={self._constant(p)}" for p in constants(self.job, self.subject)]
+        called = ", ".join([*(f"{p.name}={p.name}" for p in taken), *fixed] if direct else ["**inputs", *fixed])
         if self.runs:
             yield f"    now = {{{', '.join(f'{self.names[p.name]!r}: {self.names[p.name]}' for p in given)}}}"
         if not direct:
@@ -314,6 +320,12 @@ class _Test:
         for clause in self.guarantees:
             yield from self._heading(clause)
             yield from self._asserted(clause)
+
+    def _constant(self, port: Port) -> str:
+        """The value of a parameter, as the unit takes it."""
+        assert port.value is not None
+        text = self.before.formula(port.value)
+        return f"float({text})" if self.doubles and isinstance(port.sort, sorts.RealSort) else text
 
     def _heading(self, clause: Clause) -> Iterator[str]:
         yield ""

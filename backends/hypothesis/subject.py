@@ -114,7 +114,7 @@ def _step_class(found: SubjectFile, definition: ast.ClassDef, step: ast.Function
         message = f"`{definition.name}` is made without arguments"
         problems.append(Diagnostic("HYPO104", message, _span(begun, str(found.path))))
     taken = {a.arg for a in (*step.args.args, *step.args.kwonlyargs)}
-    for port in job.node.inputs:
+    for port in (*job.node.inputs, *job.node.fixed):
         if port.name not in taken and step.args.kwarg is None:
             message = f"`step` does not take the input `{port.name}`"
             problems.append(Diagnostic("HYPO104", message, _span(step, str(found.path))))
@@ -287,7 +287,7 @@ def _arguments(
     if isinstance(definition, ast.AsyncFunctionDef):
         message = f"`{definition.name}` is async; a subject is a plain function"
         problems.append(Diagnostic("HYPO104", message, _span(definition, file)))
-    inputs = [port.name for port in job.node.inputs]
+    inputs = [port.name for port in (*job.node.inputs, *job.node.fixed)]
     arguments = definition.args
     optional = len(arguments.defaults)
     positional = [*arguments.posonlyargs, *arguments.args]

@@ -59,7 +59,8 @@ class Unit:
         """The inputs that are passed, as data."""
         driven, accepted = self.asked.driven, self.asked.accepted
         passed = inputs.keys() - self.asked.held.keys() if driven or accepted is None else inputs.keys() & accepted
-        return {n: sent(v, doubles=self.doubles, lists=driven) for n, v in inputs.items() if n in passed}
+        given = {**{n: v for n, v in inputs.items() if n in passed}, **self.asked.constants}
+        return {n: sent(v, doubles=self.doubles, lists=driven) for n, v in given.items()}
 
     def request(self, request: Any) -> Any:
         """The reply to a request. Raises SubjectFailed."""
@@ -86,6 +87,8 @@ class Unit:
         plain = request if not self.asked.driven else (json.loads(request["case"])["steps"] or [{}])[0]
         found: Inputs = {}
         for name, data in plain.items():
+            if name in self.asked.constants:
+                continue
             try:
                 found[name] = received(data, self.inputs[name], name)
             except (Malformed, ValueError):

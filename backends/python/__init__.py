@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from avow.backend_kit.given import NAN, schema
-from avow.backend_kit.protocol import Backend, Job, Limits, Report, Tool
+from avow.backend_kit.protocol import Backend, Job, Limits, Opens, Report, Tool
 from avow.base.codes import Catalogue
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.tools import z3_tool
@@ -37,6 +37,9 @@ class PythonBackend(Backend):
 
     def tools(self) -> tuple[Tool, ...]:
         return (z3_tool(),)
+
+    def opens(self, job: Job) -> Opens:
+        return Opens.VALUES
 
     def check(self, job: Job) -> tuple[Diagnostic, ...]:
         from .reading import load

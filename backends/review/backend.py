@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from avow.backend_kit.given import existing_file, file, schema, summarized
-from avow.backend_kit.protocol import Backend, Job, Limits, Report
+from avow.backend_kit.protocol import Backend, Job, Limits, Opens, Report
 from avow.base.codec import document
 from avow.base.codes import Catalogue
 from avow.base.diagnostics import Diagnostic, Rejected, Severity
@@ -53,6 +53,9 @@ class ReviewBackend(Backend):
         "A named person read exactly these files, answered every question of the checklist and accepted this "
         "guarantee in exactly this meaning. It shows what that person saw, no more."
     )
+
+    def opens(self, job: Job) -> Opens:
+        return Opens.ANY
 
     def check(self, job: Job) -> tuple[Diagnostic, ...]:
         try:

@@ -30,18 +30,7 @@ from . import observing
 from .pace import NO_TIME, RATE, By, Leeway, Rate, duration
 from .pairing import NUMBER, Answers
 from .reading import Undecided, from_text, shown
-from .rules import (
-    NOTHING_KNOWN,
-    Choice,
-    Constant,
-    FieldPath,
-    Fields,
-    Previous,
-    Rule,
-    of_latest,
-    otherwise,
-    read_from_inputs,
-)
+from .rules import Choice, Constant, FieldPath, Fields, Previous, Rule, of_latest, otherwise, read_from_inputs
 from .traces import carried
 from .tuning import DECIDED_SHARE
 from .wires import MappingError, parts_of, table_of, whole
@@ -56,7 +45,7 @@ class Setup:
     hidden: Mapping[str, str]
     when: str = "outputs"
     """When a clause is judged: the option of that name."""
-    known: Definitions = NOTHING_KNOWN
+    known: Definitions = field(default_factory=lambda: Definitions({}))
     """The message types."""
     answers: Answers | None = None
     """How answers are paired with inputs; None: not specified."""

@@ -138,3 +138,9 @@ LOG_KEPT = 20_000
 
 LAYOUT_FIELDS = 10_000
 """Fields and items of a raw message that are read as arrays: a laser scan has some thousands, an image a million."""
+
+PARAMETER_VALUES = 5
+"""A program that is made with a contract's open parameters is tried with so many values: ends and between."""
+
+PARAMETERS_TRIED = 10_000
+"""Combinations of values that are looked at for ones that the assumptions allow."""
