@@ -64,6 +64,8 @@ class Port:
     """Whether it is an input that has one value during a run."""
     value: Term | None = None
     """The value of a parameter, if the plan gives one."""
+    unit: str = ""
+    """As written (`avow.language.units`); empty: any."""
 
     @property
     def variable(self) -> Variable:

@@ -144,6 +144,7 @@ class Declarations:
         """Registers a definition by name, with its parameters; its body is checked when it is looked up."""
         parameters: dict[str, Variable] = {}
         sound = True
+        no_units(tree.parameters, reports)
         for part in tree.parameters:
             sort = self.type_of(part.type, reports, part.name.text)
             taken = scope.taken(part.name.text)
@@ -276,6 +277,7 @@ class Declarations:
 
     def record(self, fields: Sequence[syntax.PortDeclaration], reports: Reports, name: str) -> s.Sort | None:
         sound, seen = True, dict[str, Span]()
+        no_units(fields, reports)
         for part in fields:
             label = part.name
             if label.text in seen:
@@ -400,6 +402,14 @@ class Declarations:
             environment.anonymous[sort.name] = sort
         environment.add_elements(sort)
         return sort
+
+
+def no_units(ports: Sequence[syntax.PortDeclaration], reports: Reports) -> None:
+    """Reports the units of what is no input or output."""
+    for token in (part.unit for part in ports):
+        if token is not None:
+            message = "only an input or output of a number type has a unit"
+            reports.error("RCL222", message, token.start, token.end)
 
 
 def _tuple_sort(items: Sequence[s.Sort | None]) -> s.Sort | None:

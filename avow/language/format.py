@@ -304,9 +304,15 @@ def _ports(found: Sequence[Token]) -> list[str]:
         depth += (token.type in ("LPAR", "LBRACE", "LSQUARE")) - (token.type in ("RPAR", "RBRACE", "RSQUARE"))
         typed = typed or token.type == "COLON"
         if token.type == "COMMA" and depth == 0 and typed:
-            items.append(flat(found[begin:at]))
+            items.append(_port(found[begin:at]))
             begin, typed = at + 1, False
-    return [*items, flat(found[begin:])]
+    return [*items, _port(found[begin:])]
+
+
+def _port(found: Sequence[Token]) -> str:
+    """A declaration; its unit has no spaces."""
+    at = next((k for k, token in enumerate(found) if token.type == "IN"), len(found))
+    return flat(found[:at]) + (f" in {''.join(token.text for token in found[at + 1 :])}" if found[at:] else "")
 
 
 def _topic(tree: syntax.TopicDeclaration) -> str:

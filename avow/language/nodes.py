@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
-from avow.base.diagnostics import Span
+from avow.base.diagnostics import Diagnostic, Span
 from avow.base.suggestions import did_you_mean
 from avow.base.tuning.sizes import CLAUSE_PARTS, NESTING
 from avow.language.checker import Checker
 from avow.language.contract import Clause, ClauseKind, Node, Port, Topic
-from avow.language.declarations import Declarations
+from avow.language.declarations import Declarations, no_units
 from avow.language.definedness import with_value
 from avow.language.flat import flat_text
 from avow.language.lexer import Token, unquote
@@ -21,6 +21,7 @@ from avow.language.source import Reports
 from avow.language.subterms import histories, sort_extent, term_extent
 from avow.language.syntax import ClauseSyntax, NodeSyntax, PortDeclaration, RosType, UnspecifiedType
 from avow.language.terms import Role, Term
+from avow.language.units import BASES, DERIVED, ONE_UNIT, clashes, unit
 from avow.ros.calls import part_topic
 from avow.ros.names import is_name
 
@@ -54,9 +55,26 @@ def check_ports(
             written = flat_text(reports.source.text[part.type.start : part.type.end])
             type_name = show_type(sort) if isinstance(part.type, UnspecifiedType) else written
             span = reports.source.span(name.start, name.end)
-            ports[name.text] = Port(role, name.text, sort, type_name, span, _is_parameter(part, sort, reports))
+            measured = _unit(part, sort, reports)
+            parameter = _is_parameter(part, sort, reports)
+            ports[name.text] = Port(role, name.text, sort, type_name, span, parameter, unit=measured)
         found.append(ports)
     return found[0], found[1]
+
+
+def _unit(part: PortDeclaration, sort: Sort, reports: Reports) -> str:
+    """The unit of a port as text, if it has one; a wrong one is reported."""
+    token = part.unit
+    if token is None:
+        return ""
+    if not isinstance(sort, RealSort | IntegerSort | NaturalSort):
+        no_units((part,), reports)
+    elif unit(token.text) is None:
+        hint = f"REP 103 has {', '.join((*BASES, *DERIVED))}, and these with `*` and `/`"
+        reports.error("RCL222", f"`{token.text}` is no unit", token.start, token.end, hint=hint)
+    else:
+        return token.text
+    return ""
 
 
 def _is_parameter(part: PortDeclaration, sort: Sort, reports: Reports) -> bool:
@@ -95,6 +113,10 @@ def check_node(
         clause = _clause(syntax, counts[syntax.kind], scope, seen, reports)
         if clause is not None:
             clauses[syntax.kind].append(clause)
+    if any(port.unit for port in (*inputs.values(), *outputs.values())):
+        for clause in (c for some in clauses.values() for c in some):
+            for clash in clashes(clause.written or clause.formula, lambda v: scope.ports(v.role)[v.name].unit):
+                reports.add(Diagnostic("RCL223", clash.message, clash.span or clause.span, hint=ONE_UNIT))
     if any(histories(clause.formula) for some in clauses.values() for clause in some):  # of one step, it says nothing
         kept = (port.constancy for port in inputs.values() if port.parameter)
         clauses[ClauseKind.ASSUMPTION] += [c for c in kept if c.name not in seen]

@@ -173,6 +173,11 @@ _CALLBACKS: dict[str, Callable[[list[Any]], Any]] = {
     "constant_declaration": lambda c: _made(syntax.ConstantDeclaration, c, c[0], c[2]),
     "definition": lambda c: _made(syntax.Define, c, c[1], c[3].items if len(c) > 4 else (), c[-1]),
     "ports": _port_list,
+    "port_in": lambda c: tuple(
+        replace(_made(syntax.PortDeclaration, (name, c[-3]), name, c[-3]), end=c[-1].end, unit=c[-1])
+        for name in c[:-4:2]
+    ),
+    "unit": lambda c: Token("NAME", "".join(token.text for token in c), c[0].start, c[-1].end),
     "given": _port_list,
     "parameter": lambda c: tuple(replace(port, marker=c[0]) for port in c[1]),
     "port": lambda c: tuple(_made(syntax.PortDeclaration, (name, c[-1]), name, c[-1]) for name in c[:-2:2]),

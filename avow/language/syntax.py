@@ -358,11 +358,13 @@ class ConstantDeclaration(_Placed):
 
 @dataclass(frozen=True, slots=True)
 class PortDeclaration(_Placed):
-    """``r : REAL``, or ``parameter r : REAL`` with the word `parameter` as its `marker`."""
+    """``r : REAL in m``, or ``parameter r : REAL`` with the word `parameter` as its `marker`."""
 
     name: Token
     type: TypeSyntax
     marker: Token | None = None
+    unit: Token | None = None
+    """Its names and signs as one."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -39,7 +39,7 @@ def to_rcl(contract: Contract) -> str:
     for node in contract.nodes:
         out += [f"node {node.name} {{"]
         for word, ports in (("inputs", node.inputs), ("outputs", node.outputs)):
-            shown = ", ".join(f"{_called(p)} : {p.type_name}" for p in ports)
+            shown = ", ".join(f"{_called(p)} : {_typed(p)}" for p in ports)
             out.append(f"  {word}( {shown} )" if shown else f"  {word}()")
         topics = ",\n          ".join(_topic(t) for t in node.topics)
         out.append(f"  topics( {topics} )" if topics else "  topics()")
@@ -96,6 +96,10 @@ def _called(port: Port) -> str:
     return f"{PARAMETER} {port.name}" if port.parameter else port.name
 
 
+def _typed(port: Port) -> str:
+    return f"{port.type_name} in {port.unit}" if port.unit else port.type_name
+
+
 def _head(clause: Clause) -> str:
     letter = "A" if clause.kind == "assumption" else "G"
     name = "" if clause.name == f"{letter}{clause.position}" else f" {clause.name}"
@@ -122,7 +126,7 @@ def _for_people(contract: Contract, style: StyleName) -> str:
     for node in contract.nodes:
         out.append(f"Node {node.name}")
         for word, ports in (("Inputs", node.inputs), ("Outputs", node.outputs)):
-            out.append(f"  {word}: {', '.join(f'{_called(p)} : {p.type_name}' for p in ports) or 'none'}")
+            out.append(f"  {word}: {', '.join(f'{_called(p)} : {_typed(p)}' for p in ports) or 'none'}")
         if node.topics:
             out.append("  Topics")
             out += [f"    {_topic(t)}" for t in node.topics]
@@ -174,8 +178,8 @@ def _node(node: Node) -> dict[str, Any]:
 
 
 def _port(port: Port) -> dict[str, Any]:
-    parameter = {"parameter": True} if port.parameter else {}
-    return {"name": port.name, "type": port.type_name, "sort": _data(port.sort)} | parameter
+    more = ({"parameter": True} if port.parameter else {}) | ({"unit": port.unit} if port.unit else {})
+    return {"name": port.name, "type": port.type_name, "sort": _data(port.sort)} | more
 
 
 def _clause(clause: Clause) -> dict[str, Any]:
@@ -259,7 +263,7 @@ def _node_table(node: Node) -> str:
 
 def _port_rows(word: str, ports: tuple[Port, ...]) -> Iterable[str]:
     words = (r"\textbf{parameter} " if p.parameter else "" for p in ports)
-    names = (f"${latex_name(p.name)} : {_type(p)}$" for p in ports)
+    names = (f"${latex_name(p.name)} : {_type(p)}$" + f" in {latex_escape(p.unit)}" * bool(p.unit) for p in ports)
     shown = r",\quad ".join(map("".join, zip(words, names, strict=True))) or "none"
     yield rf"{word} & \textbf{{FOL}} & {shown} \\ \hline\hline"
 

@@ -207,7 +207,7 @@ def _plain(text: str) -> str:
 def _about_port(port: Port, node: Node) -> str:
     words = {"in": "parameter" if port.parameter else "input", "out": "output"}
     shown = show_type(port.sort)
-    more = f" = `{shown}`" if shown != port.type_name else ""
+    more = f" = `{shown}`" * (shown != port.type_name) + f" in {port.unit}" * bool(port.unit)
     topics = [t for t in node.topics if t.port == port]
     carried = "".join(f"\n\ntopic `{t.name}` of `{t.ros_type}`" for t in topics)
     return f"`{port.role}.{port.name}` : `{port.type_name}`{more} ({words[port.role]} of {_plain(node.name)}){carried}"

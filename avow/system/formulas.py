@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.base.records import dataclass
 from avow.base.suggestions import did_you_mean
+from avow.language.contract import Contract
 from avow.language.definedness import with_value
 from avow.language.sorts import BOOL
 from avow.language.subterms import histories, ports_of
 from avow.language.terms import Past, Role, Term, Variable
+from avow.language.units import clashes
 from avow.system.folding import holders
 from avow.system.graph import Graph
 from avow.system.plan import Edge, Endpoint, System
@@ -97,6 +101,9 @@ def environment_assumptions(system: System, graph: Graph) -> tuple[Assumed, ...]
         except Rejected as rejected:
             faults += rejected.diagnostics
             continue
+        port_of = system.contract.node(owner).input
+        for clash in clashes(term, lambda v, port_of=port_of: port_of(v.name).unit if v.role is Role.INPUT else ""):  # type: ignore[misc]
+            faults.append(Diagnostic("PLAN140", f"environment: {entry.port}: {clash.message}", entry.assume_span))
         inputs = {e.port for e in graph.environment if e.node == owner}
         foreign = [v for v in ports_of(term) if v.role is not Role.INPUT or v.name not in inputs]
         if foreign and entry.taken_in:
@@ -140,7 +147,11 @@ def check_formulas(system: System, graph: Graph) -> tuple[Diagnostic, ...]:
     for requirement in system.plan.requirements:
         try:
             if requirement.formula is not None:
-                parse_state(requirement.formula, system.contract, requirement.formula_span)
+                term = parse_state(requirement.formula, system.contract, requirement.formula_span)
+                faults += [
+                    Diagnostic("PLAN140", f"requirements.{requirement.id}: {clash.message}", requirement.formula_span)
+                    for clash in clashes(term, partial(_unit, system.contract))
+                ]
             if requirement.temporal is not None:
                 parse_property(requirement.temporal, system.contract, requirement.formula_span)
         except Rejected as rejected:
@@ -150,6 +161,13 @@ def check_formulas(system: System, graph: Graph) -> tuple[Diagnostic, ...]:
     except Rejected as rejected:
         faults += rejected.diagnostics
     return tuple(dict.fromkeys(faults))
+
+
+def _unit(contract: Contract, variable: Variable) -> str:
+    """The unit of ``node.port``."""
+    name, _, port = variable.name.partition(".")
+    node = contract.node(name)
+    return (node.input if variable.role is Role.INPUT else node.output)(port).unit
 
 
 def _parse(system: System, text: str, node: str, span: Span | None, *, clause: bool = False) -> Term:

@@ -19,6 +19,7 @@ from avow.base.remembered import by_identity
 from avow.base.suggestions import nearest
 from avow.language.contract import Node, Port
 from avow.language.sorts import INTEGER, NATURAL, Sort
+from avow.language.units import unit
 from avow.system.plan import Edge, Endpoint, System
 from avow.system.topics import Carrier, Ends, contradicted, ends, unheard, unlinked, wrong_types
 
@@ -95,6 +96,7 @@ def dataflow(system: System) -> Graph:
         if edge.target.node not in relays:
             faults += unheard(edge.source, edge.target, found, edge.span)
     edges = [replace(e, topic=_topic(e, found)) for e in edges]
+    faults += [fault for edge in edges if (fault := _units(system, edge)) is not None]
     return wired(nodes, edges, faults, {node.name: node.span for node in nodes})
 
 
@@ -169,6 +171,16 @@ def _ports(system: System, connection: Edge) -> tuple[Port, Port] | None:
         return source, system.contract.node(connection.target.node).input(connection.target.port)
     except KeyError:
         return None  # reported, with its place, by avow.system.names
+
+
+def _units(system: System, edge: Edge) -> Diagnostic | None:
+    """The fault if both ends have a unit, and not the same."""
+    source, target = (system.contract.node(at.node) for at in (edge.source, edge.target))
+    given, wanted = source.output(edge.source.port).unit, target.input(edge.target.port).unit
+    if not given or not wanted or unit(given) == unit(wanted):
+        return None
+    message = f"{edge.source} is in {given}, and {edge.target}, which it feeds, in {wanted}"
+    return Diagnostic("PLAN140", message, edge.span, hint="convert the value, or correct a unit")
 
 
 def _topic(edge: Edge, found: Ends) -> str:

@@ -128,6 +128,24 @@ def test_an_initial_value_of_another_type(tmp_path: Path, sort: str, initial: st
     assert hint in (found.hint or "")
 
 
+def test_units_of_links_and_formulas(tmp_path: Path) -> None:
+    rcl = """
+node a { inputs( t : REAL in s ) outputs( x : REAL in m, y : REAL ) topics() guarantee ( x > 0 and y > t ) }
+node b { inputs( x : REAL in m/s, y, z : REAL in m ) outputs( o : BOOL ) topics() guarantee ( o <=> x > 0 or y > z ) }
+"""
+    plan = """
+environment: {b.z: {assume: in.z > 0, because: x}, in.t: {assume: in.t > 3, because: x}}
+requirements:
+  R: {text: a, formula: "a.x > b.z", supported_by: [a]}
+  S: {text: a, formula: "a.t > b.z", supported_by: [a]}
+"""
+    assert sorted(d.message for d in faults(tmp_path, rcl, plan) if d.code == "PLAN140") == [
+        "a.x is in m, and b.x, which it feeds, in m/s",
+        "requirements.S: `a.in.t` is in s and `b.in.z` is in m",
+    ]
+    assert make(tmp_path, rcl.replace("m/s", "m"), plan.replace("a.t >", "a.y >"))
+
+
 def test_every_code_is_declared_and_triggered() -> None:
     sources = [*(ROOT / "avow/system").glob("*.py"), *(ROOT / "avow/calculus").glob("*.py")]
     used = {code for path in sources for code in re.findall(r"PLAN\d{3}", path.read_text())}
