@@ -234,6 +234,13 @@ NODE = "<node name='b' pkg='p' exec='b'>{}</node>"
         ("limit: 3.0", "Node(name='b', package='p', executable='b', parameters=[HERE, {'limit': 3.0}])", ""),
         ("limit: 2.0", "Node(name='b', package='p', executable='b', parameters=[HERE])", "limit = 3.0"),
         ("limit: 2.0", "Node(name='b', package='p', executable='b', parameters=[unknown()])", "not read"),
+        ("limit: 2.0", "Node(name='b', ros_arguments=['-p', 'limit:=3.0'])", "limit = 3.0"),
+        ("limit: 2.0", "Node(name='b', arguments=['--ros-args', '-p', 'limit:=4.0', '-r', 'x:=y'])", "limit = 4.0"),
+        ("limit: 3.0", "Node(name='b', ros_arguments=['-p', 'limit:=4.0'], parameters=[HERE])", ""),
+        ("limit: 2.0", "Node(name='b', ros_arguments=['-p', 'b:limit:=3.0'])", "not read"),
+        ("limit: 2.0", NODE.format("<param name='limit' value='3.0' if='false'/>"), ""),
+        ("limit: 2.0", NODE.format("<rosparam file='$(dirname)/plain.yaml'/>"), "limit = 5.0"),
+        ("limit: 2.0", NODE.format("<rosparam file='$(dirname)/plain.yaml' ns='x'/>"), "not read"),
         ("limit: 2.0", "Node(name='b', package='p', executable='b', parameters=[HERE, unknown()])", "not read"),
         ("limit: 2.0", "Node(name='b', package='p', executable='b', parameters=[HERE, 'p.yaml'])", "not read"),
         ("limit: 2.0", "Node(name='b', package='p', executable='b', parameters=['p.yaml', HERE])", "limit = 3.0"),
@@ -257,6 +264,7 @@ def test_parameters_of_a_launch_file_are_compared(tmp_path: Path, own: str, laun
         folder = make(tmp_path, plan + LAUNCH.replace(".launch]", ".launch.xml]"))
         (tmp_path / "launch/robot.launch.xml").write_text(f"<launch>{launched}</launch>", encoding="utf-8")
     (tmp_path / "launch/p.yaml").write_text("'/**': {ros__parameters: {limit: 3.0}}", encoding="utf-8")
+    (tmp_path / "launch/plain.yaml").write_text("limit: 5.0", encoding="utf-8")
     (folder / "b.py").write_text(CLASS, encoding="utf-8")
     (folder / "p.yaml").write_text(own, encoding="utf-8")
     if said in ("", "not read", "sets nothing"):  # what the file itself lacks is told where the class is driven

@@ -19,6 +19,7 @@ from avow.base.files import read_regular, read_text
 from avow.base.records import dataclass
 from avow.base.tuning.sizes import LAUNCH_BYTES, LAUNCH_DEPTH, LAUNCH_ELEMENTS, PACKAGES_SEARCHED
 from avow.ros.launch.elements import Element, Parsed, Text, Unread, WrongLaunch, place, unread
+from avow.ros.launch.overrides import overrides
 from avow.ros.launch.python import from_python
 from avow.ros.names import is_name
 
@@ -308,7 +309,8 @@ class _Reading:
             if child.tag == "remap":
                 self.one(child, own)
         doubt += own.doubt
-        name, rest = self.command_line(element, scope, doubt)
+        given: list[tuple[str, str]] = []
+        name, rest = self.command_line(element, scope, doubt, given)
         remaps = [*scope.remaps, *rest, *own.remaps]
         others = [*scope.remaps, *own.remaps]
         doubt += [
@@ -327,7 +329,7 @@ class _Reading:
                 self.tell(element, f"the node's name is not known: {why}")
         parts = [self.shown(element.get(key), scope) for key in ("pkg", "exec", "type", "plugin")]
         kind = "/".join(part for part in parts if part)
-        settings = tuple(self.settings(element, scope))
+        settings = (*(Setting(*one, element.span) for one in given), *self.settings(element, scope))
         self.nodes.append(Started(whole, kind, tuple(remaps), tuple(dict.fromkeys(doubt)), element.span, settings))
         if element.tag.endswith("container"):
             self.each((e for e in element.children if e.tag == "composable_node"), outer)
@@ -335,12 +337,14 @@ class _Reading:
     def settings(self, element: Element, scope: _Scope) -> Iterator[Setting]:
         """The parameters that a node is started with, as far as they are known."""
         for child in element.children:
-            if child.tag == "param" and self.condition(child, scope) is True:
-                name, value = self.shown(child.get("name"), scope), self.shown(child.get("from", "value"), scope)
-                yield Setting(name, value if name or "from" in child.attributes else "", child.span)
+            if child.tag in ("param", "rosparam") and (holds := self.condition(child, scope)) is not False:
+                name = self.shown(child.get("name"), scope)
+                value = self.shown(child.get("from", "file", "value"), scope)
+                file = "from" in child.attributes or child.attributes.keys() == {"file"}
+                yield Setting(name, value if holds is True and (name or file) else "", child.span)
 
     def command_line(
-        self, element: Element, scope: _Scope, doubt: list[str]
+        self, element: Element, scope: _Scope, doubt: list[str], given: list[tuple[str, str]]
     ) -> tuple[str | None, list[tuple[str, str]]]:
         """The name and the remappings among a node's arguments: ``scan:=front __name:=x``."""
         name: str | None = None
@@ -355,6 +359,7 @@ class _Reading:
                 self.tell(element, f"the arguments are not known, which may remap: {why}")
                 doubt.append(f"its arguments are not known ({why})")
                 continue
+            given += overrides(words)
             for before, word in zip(["", *words], words, strict=False):
                 old, sign, new = word.partition(":=")
                 if not sign or before in ("-p", "--param") or old.startswith("_") != old.startswith("__"):
