@@ -50,6 +50,8 @@ class Level(StrEnum):
     """Some guarantee below is proved or checked of a model only: the program that runs may differ."""
     TESTS = "shown by tests"
     """Some guarantee below, or the requirement itself, is sampled: tests, recordings, measurements."""
+    TESTED_MODELS = "shown by tests of models"
+    """Some guarantee below is sampled of a model only: the program that runs may differ, and so may other inputs."""
     ARGUED = "argued"
     """A person states that the guarantees named amount to the sentence, or that some guarantee below holds."""
     NOT_SHOWN = "not shown"
@@ -61,13 +63,14 @@ class Level(StrEnum):
 
     @property
     def holds(self) -> bool:
-        return self in (Level.SHOWN, Level.MODELS, Level.TESTS, Level.ARGUED)
+        return self in (Level.SHOWN, Level.MODELS, Level.TESTS, Level.TESTED_MODELS, Level.ARGUED)
 
 
 MEANINGS = {
     Level.SHOWN: "everything below is proved, or checked exhaustively, of the running program",
     Level.MODELS: "something below is proved or checked of a model only; the program may differ",
     Level.TESTS: "something below is sampled: tests, recordings or measurements",
+    Level.TESTED_MODELS: "something below is sampled, of a model only; the program may differ",
     Level.ARGUED: "a person vouches for the sentence or for a guarantee below",
     Level.NOT_SHOWN: "evidence is missing or stale, the requirement is not validated, or a claim below is not shown",
     Level.REFUTED: "there is a counterexample",

@@ -113,7 +113,7 @@ def conclude(facts: Facts) -> Case:
         *handle("expected", facts.expected or (), facts.obligations, statuses, counting, facts.today),
         *handle("accepted", facts.accepted, facts.obligations, statuses, counting, facts.today),
     )
-    names = Names(facts)
+    names = Names(facts, {name for name, entries in counting.items() if _is_certified(entries)})
     resting = {o.id: behind(e.evidence for e in counting[o.id]) for o in facts.obligations}
     claims = [
         obligation_claim(o, statuses[o.id], *resting[o.id], _link(counting[o.id]), names) for o in facts.obligations
@@ -480,6 +480,12 @@ def _method(proofs: Sequence[set[str]]) -> str | None:
     """A method whose current records prove every guarantee of a node, unconditionally, of a program that always has
     an output; `proofs` are the methods that prove each."""
     return min(set[str].intersection(*proofs), default=None)
+
+
+def _is_certified(entries: Sequence[Entry]) -> bool:
+    """Whether every record that supports a claim has a certificate."""
+    records = [e.evidence for e in entries if weigh(e.evidence).support is not None]
+    return bool(records) and all("certificate" in record.details for record in records)
 
 
 def _is_proof(record: Evidence) -> bool:

@@ -202,7 +202,9 @@ def _verdict(
     tone = min((r.tone for r in requirements), key=_rank)
     rates = [r.rate for r in requirements if r.rate is not None]
     worst = max(rates, key=lambda rate: Fraction(rate.bound or 1), default=None)
-    brief = worst.brief if worst and level is Level.TESTS else NO_RATE  # of what is argued, no sample gives a rate
+    brief = (
+        worst.brief if worst and level in (Level.TESTS, Level.TESTED_MODELS) else NO_RATE
+    )  # of what is argued, no sample gives a rate
     return level, said(level) + (f" ({brief})" if worst else ""), tone
 
 

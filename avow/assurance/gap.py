@@ -12,6 +12,7 @@ from avow.assurance.facts import Facts
 from avow.assurance.model import Currency, MethodInfo, ObligationView, Suggestion
 from avow.assurance.naming import short
 from avow.assurance.policy import Demand, Policy, asked_of, costs
+from avow.assurance.relied import judgements
 from avow.base.graphs import components
 from avow.base.persons import one_person
 from avow.base.plain import count
@@ -150,6 +151,8 @@ def _disregarded(item: Evidence, demand: Demand, policy: Policy, today: date) ->
         return f"it is of a {item.of}, {' or '.join(demand.of)} is asked"
     if demand.numbers and item.numbers not in demand.numbers:
         return f"a REAL is {item.numbers} in it, {' or '.join(demand.numbers)} is asked"
+    if support is Status.TESTED and 0 < (many := judgements(item)) < demand.cases:
+        return f"{count(many, 'case')} met its condition, {demand.cases} are asked"
     if demand.unconditional and item.hypotheses:
         return "rests on hypotheses"
     kept = item.details.get(ISOLATION)

@@ -54,6 +54,8 @@ class Demand:
     """The objects that may have been verified; empty: any."""
     numbers: tuple[Numbers, ...] = ()
     """The semantics of REAL that may have been used; empty: any."""
+    cases: int = field(default=0, metadata=codec.LATER)
+    """The least number of cases or runs that met the guarantee's condition in a test."""
 
     def max_age(self, status: Status) -> int | None:
         ages = dict(self.max_age_days)
@@ -73,6 +75,7 @@ class Demand:
             f"isolation {self.isolation} or better": self.isolation is not Isolation.NONE,
             f"reviews by {self.reviewers} persons": self.reviewers > 1,
             **{f"{word} not older than {days} days": True for word, days in self.max_age_days},
+            f"tests of {self.cases} cases or more": self.cases,
         }
         return ", ".join(part for part, asked in parts.items() if asked)
 
@@ -165,7 +168,7 @@ _KEYS = (
 )
 _DEMAND_KEYS = (
     *("one_of", "methods", "independent", "max_age_days", "reviewers", "ties", "unconditional", "isolation"),
-    *("of", "numbers"),
+    *("of", "numbers", "cases"),
 )
 
 
@@ -237,6 +240,7 @@ class _PolicyReader:
             independent=self.flag(data.get("independent", False), (*path, "independent")),
             max_age_days=self.ages(data.get("max_age_days", {}), (*path, "max_age_days")),
             reviewers=self.count(data.get("reviewers", 1), (*path, "reviewers")),
+            cases=self.count(data.get("cases", 0), (*path, "cases")),
             links=tuple(Link(word) for word in self.words(data.get("ties", ()), tuple(Link), (*path, "ties"))),
             unconditional=self.flag(data.get("unconditional", False), (*path, "unconditional")),
             isolation=self.level(data.get("isolation", Isolation.NONE.value), (*path, "isolation")),

@@ -107,13 +107,13 @@ def level_of(claims: Iterable[str], views: Mapping[str, ObligationView], relied:
     assumptions; agreement of a program with its model counts under the model."""
     below = [(views[name].obligation.kind, relied[name]) for name in claims if name in relied]
     leaves = [found for kind, found in below if kind in (Kind.GUARANTEE, Kind.REQUIREMENT)]
-    statuses = {found.status for found in leaves}
+    statuses, sampled = {found.status for found in leaves}, {Status.TESTED, Status.MONITORED}
     if statuses & {Status.REVIEWED, Status.JUSTIFIED}:
         return Level.ARGUED
-    if statuses & {Status.TESTED, Status.MONITORED}:
-        return Level.TESTS
-    guarantees = [found for kind, found in below if kind is Kind.GUARANTEE]
-    return Level.MODELS if any(looked_at(found) is Object.MODEL for found in guarantees) else Level.SHOWN
+    models = {found.status for kind, found in below if kind is Kind.GUARANTEE and looked_at(found) is Object.MODEL}
+    if statuses & sampled:
+        return Level.TESTED_MODELS if models & sampled else Level.TESTS
+    return Level.MODELS if models else Level.SHOWN
 
 
 def _failing_of(

@@ -3,7 +3,7 @@ calculus."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence, Set
 
 from avow.assurance.facts import Facts
 from avow.assurance.findings import takes
@@ -20,7 +20,9 @@ from avow.system.plan import Requirement
 class Names:
     """The claims that the names in a plan or a backend denote."""
 
-    def __init__(self, facts: Facts) -> None:
+    def __init__(self, facts: Facts, certified: Set[str]) -> None:
+        """`certified`: obligations whose proofs have a certificate, which names everything that they rest on."""
+        self.certified = certified
         self.obligations = {o.id: o for o in facts.obligations}
         self.local = {o.local_id: o.id for o in facts.obligations}
         self.guarantees: dict[str, list[str]] = {node.name: [] for node in facts.nodes}
@@ -157,12 +159,14 @@ def requirement_support(requirement: Requirement, names: Names) -> tuple[tuple[s
             rests += found
             rests += names.behind(name)
     formal = requirement.formula or requirement.temporal
+    own = names.own.get(requirement.id, ())
     if (
         formal
         and not requirement.supported_by
-        and not any(names.obligations[o].clauses for o in names.own.get(requirement.id, ()))
+        and not any(names.obligations[o].clauses for o in own)
+        and not (own and names.certified >= set(own))
     ):
-        # it was discharged on the contracts without naming which: then it rests on all
+        # it was discharged on the contracts, and nothing says on which: then it rests on all
         rests += names.every_guarantee()
     return tuple(dict.fromkeys(rests)), tuple(unknown)
 

@@ -179,8 +179,8 @@ def test_no_verdict_is_above_what_lies_below_it(listed: list[Evidence], said: li
             least = Level.NOT_SHOWN
         elif sure:
             least = Level.SHOWN if any(r.of is Object.SOURCE for r in sure) else Level.MODELS
-        elif any(r.verdict is Verdict.TESTED for r in own):
-            least = Level.TESTS
+        elif tests := [r for r in own if r.verdict is Verdict.TESTED]:
+            least = Level.TESTS if any(r.of is not Object.MODEL for r in tests) else Level.TESTED_MODELS
         else:
             least = Level.ARGUED if any(r.verdict is Verdict.REVIEWED for r in own) else Level.NOT_SHOWN
         best = max(best, least, key=list(Level).index)
@@ -324,13 +324,24 @@ def test_a_side_condition_brings_what_its_proof_used_and_a_guarantee_what_its_no
     named = ("b", "b.g", "b/hoare")
     hazards = tuple(Hazard(name, "It burns", "critical", mitigated_by=(name,)) for name in named)
     made = replace(made, plan=replace(made.plan, hazards=hazards))
-    assert {hazard.level for hazard in case(made, listed, given_).hazards} == {Level.TESTS}
+    assert {hazard.level for hazard in case(made, listed, given_).hazards} == {Level.TESTED_MODELS}
     assert {hazard.level for hazard in case(made, listed, given_[1:]).hazards} == {Level.NOT_SHOWN}
     lost = case(made, listed, given_[1:]).requirements[0]
     assert lost.level is Level.NOT_SHOWN
     assert lost.failing == (GUARANTEES[0].id,)
     nothing = case(made, [*GUARANTEES], given_[:2])
     assert [s.key for s in nothing.assumptions if s.sort is Sort.WORLD] == ["assumption.b.input"]
+
+
+def test_a_requirement_that_names_no_support_rests_on_what_its_certificate_names_or_else_on_everything() -> None:
+    own = obligation(SYSTEM_LEVEL, Kind.REQUIREMENT, "R")
+    proof = evidence(own, method="compose", details={"needed": ["b.g"]})
+    certified = replace(proof, details={**proof.details, "certificate": {"key": "k", "solvers": 1}})
+    asked = subject(replace(FORMAL, supported_by=()))
+    tests = [evidence(g, Verdict.TESTED, "hypothesis") for g in GUARANTEES]
+    for record, below in ((proof, GUARANTEES), (certified, GUARANTEES[2:])):
+        (found,) = case(asked, [*GUARANTEES, own], [record, *tests]).requirements
+        assert [g for g in GUARANTEES if g.id in found.closure] == below
 
 
 def test_a_key_is_about_a_whole_word() -> None:
@@ -529,7 +540,7 @@ def test_what_was_seen_has_one_wording(verdict: Verdict, method: str, bound: dic
 
 def test_requirements_on_another_guarantee_of_the_weakest_node_are_counted_beside_it() -> None:
     def drawn(bound: float) -> dict[str, object]:
-        return {"cases": 10, "failure_probability_below": bound, "confidence": 0.95}
+        return {"cases": 20, "failure_probability_below": bound, "confidence": 0.95}
 
     node = [guarantee("a", "g"), guarantee("a", "h")]
     asked = [replace(PROSE, id=name, supported_by=(f"a.{g}",)) for name, g in (("R1", "g"), ("R2", "h"), ("R3", "h"))]
@@ -542,7 +553,7 @@ def test_requirements_on_another_guarantee_of_the_weakest_node_are_counted_besid
         ("R1", "H"),
         "; 2 other requirements rest on this node's other guarantees",
     )
-    assert whole.answers.next_weakest.startswith("a: “a meets h”: 10 cases")
+    assert whole.answers.next_weakest.startswith("a: “a meets h”: 20 cases")
     proved = case(system({"a": ["g", "h"]}, requirements=asked), node, [made[0], evidence(node[1])])
     assert proved.answers.next_weakest == "", "a proof is not weak"
     assert {d.key: d.claims for d in proved.deficits}.get("idle") is None

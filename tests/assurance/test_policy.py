@@ -194,6 +194,7 @@ def test_age_reviewers_links_hypotheses() -> None:
         ({"of": ["source"]}, (replace(PROOF, of=Object.SOURCE),)),
         ({"numbers": ["float64"]}, (replace(PROOF, numbers="float64"),)),
         ({"unconditional": True}, (PROOF,)),
+        ({"cases": 20}, (replace(TEST, bound={"cases": 300, "triggered": 20}),)),
         ({"isolation": "processes"}, (replace(TEST, details={ISOLATION: "processes"}),)),
     ],
 )
@@ -203,6 +204,13 @@ def test_each_demand_counts_without_the_names_of_statuses(asked: dict[str, Any],
     assert not gate(the_case(policy))[0]
     assert "nothing is asked" not in read_policy(located(policy)).demand("high").text()
     assert gate(the_case({"guarantees": {"high": {}}}))[0]
+
+
+def test_a_test_of_too_few_cases_does_not_count() -> None:
+    few = replace(TEST, bound={"cases": 300, "triggered": 19})
+    told = "19 cases met its condition, 20 are asked"
+    assert told in gate(the_case({"guarantees": {"high": {"one_of": ["tested"], "cases": 20}}}, few))[1]
+    assert [n for n in profile_names() if not profile(n).demand("medium").cases] == ["reproduction"]
 
 
 def test_what_is_asked_is_said_in_the_words_of_the_page() -> None:

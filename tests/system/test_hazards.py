@@ -14,7 +14,7 @@ from avow.assurance.case import conclude_again
 from avow.assurance.model import Case
 from avow.assurance.traceability import trace
 from avow.base.diagnostics import Rejected
-from avow.base.verdict import Verdict
+from avow.base.verdict import Object, Verdict
 from avow.evidence.record import Evidence
 from avow.report.bowtie import bowtie
 from avow.system.load import load_system
@@ -104,7 +104,8 @@ PROOF = evidence(G, Verdict.PROVED, "hoare")
         ((), (PROOF,), Level.NOT_SHOWN, False),
         (("n",), (PROOF,), Level.MODELS, True),
         (("n.g", "n"), (PROOF,), Level.MODELS, True),
-        (("n.g",), (evidence(G, Verdict.TESTED, "hypothesis"),), Level.TESTS, True),
+        (("n.g",), (evidence(G, Verdict.TESTED, "hypothesis"),), Level.TESTED_MODELS, True),
+        (("n.g",), (evidence(G, Verdict.TESTED, "hypothesis", of=Object.SOURCE),), Level.TESTS, True),
         (("n/hypothesis",), (PROOF,), Level.NOT_SHOWN, False),
         (("n/hoare",), (PROOF,), Level.MODELS, True),
         (("n.g",), (), Level.NOT_SHOWN, False),
