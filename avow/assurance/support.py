@@ -158,15 +158,12 @@ def requirement_support(requirement: Requirement, names: Names) -> tuple[tuple[s
         else:
             rests += found
             rests += names.behind(name)
-    formal = requirement.formula or requirement.temporal
     own = names.own.get(requirement.id, ())
-    if (
-        formal
-        and not requirement.supported_by
-        and not any(names.obligations[o].clauses for o in own)
-        and not (own and names.certified >= set(own))
-    ):
-        # it was discharged on the contracts, and nothing says on which: then it rests on all
+    named = requirement.supported_by or any(names.obligations[o].clauses for o in own)
+    certified = bool(own) and names.certified >= set(own)
+    # a property of runs is about the composition of all nodes, whatever the plan names; and if nothing says which
+    # guarantees a formula was discharged on, it rests on all
+    if requirement.temporal or (requirement.formula and not named and not certified):
         rests += names.every_guarantee()
     return tuple(dict.fromkeys(rests)), tuple(unknown)
 

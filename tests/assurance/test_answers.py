@@ -339,8 +339,13 @@ def test_a_requirement_that_names_no_support_rests_on_what_its_certificate_names
     certified = replace(proof, details={**proof.details, "certificate": {"key": "k", "solvers": 1}})
     asked = subject(replace(FORMAL, supported_by=()))
     tests = [evidence(g, Verdict.TESTED, "hypothesis") for g in GUARANTEES]
-    for record, below in ((proof, GUARANTEES), (certified, GUARANTEES[2:])):
-        (found,) = case(asked, [*GUARANTEES, own], [record, *tests]).requirements
+    of_runs = subject(replace(FORMAL, formula=None, temporal="always a.x > 0", supported_by=("a.g",)))
+    for plan, record, below in (
+        (asked, proof, GUARANTEES),
+        (asked, certified, GUARANTEES[2:]),
+        (of_runs, replace(proof, verdict=Verdict.REFUTED), GUARANTEES),  # a run is one of all nodes
+    ):
+        (found,) = case(plan, [*GUARANTEES, own], [record, *tests]).requirements
         assert [g for g in GUARANTEES if g.id in found.closure] == below
 
 
