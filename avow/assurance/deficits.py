@@ -102,7 +102,7 @@ def deficits(
         "models": [v.id for v in guarantees if v.id in relied and looked_at(relied[v.id]) is Object.MODEL],
         "unowned": [s.key for s in assumptions if not s.owned],
         "bare": [s.key for s in assumptions if not s.reasoned],
-        "sampled": [v.id for v in leaves if _status(v, relied) in (Status.TESTED, Status.MONITORED)],
+        "sampled": [v.id for v in views if _status(v, relied) in (Status.TESTED, Status.MONITORED)],
         "unanswered": [v.id for v in leaves if any(e.entry.evidence.bound.get("unanswered") for e in v.counting)],
         "nan": [v.id for v in leaves if any(e.entry.evidence.details.get("no numbers") for e in v.counting)],
         "read": [v.id for v in guarantees if _status(v, relied) is Status.REVIEWED],

@@ -222,6 +222,7 @@ class RequirementView:
     unknown_names: tuple[str, ...]
     """Names under `supported_by` that denote nothing."""
     status: Status
+    """The lowest status below it, persons' reasons included. No format shows it: the one that stands is `level`."""
     weakest: str
     weakest_status: Status
     below: tuple[str, ...]

@@ -72,6 +72,7 @@ def held(
     bounded = any(views[n].status is not Status.PROVED for n in view.obligations) or is_bounded(closed.claims, relied)
     rate = rate_of(view.obligations, closed.claims, views)
     awaits = level is Level.NOT_SHOWN and not fails
+    weakest = weakest_of(closed.claims, views, relied, titles)
     return replace(
         view,
         level=level,
@@ -80,19 +81,24 @@ def held(
         tone=Tone.AMBER if awaits else tone_of(level, mine, bounded=bounded),
         closure=closed.claims,
         failing=closed.failing,
-        weakest_evidence=(_failing_of(view, closed, views, titles) if fails else None)
-        or weakest_of(closed.claims, views, relied, titles),
+        weakest_evidence=(_failing_of(view, closed, views, titles) if fails else None) or weakest,
         supposes=tuple(s.key for s in mine),
         rate=rate,
         searched=next((seen(r) for n in view.obligations if (r := relied.get(n)) and r.status is Status.TESTED), ""),
-        answer=_with_level(view, level, rate, awaits=awaits),
+        answer=_with_level(view, level, rate, weakest, awaits=awaits),
     )
 
 
-def _with_level(view: RequirementView, level: Level, rate: RateView | None, *, awaits: bool) -> str:
+def _with_level(
+    view: RequirementView, level: Level, rate: RateView | None, weakest: WeakestEvidence | None, *, awaits: bool
+) -> str:
     if not view.status.supports:
         return view.answer
-    parts = [f"{level.capitalize()}.", "Nobody has validated its sentence." if awaits else "", view.answer]
+    parts = [f"{level.capitalize()}.", "Nobody has validated its sentence." if awaits else ""]
+    parts += [
+        f"The weakest evidence below it: {short(weakest.claim)}, {weakest.status}." if weakest else "",
+        view.answer,
+    ]
     parts.append(f"F{rate.words[1:]}." if rate else "")
     return " ".join(part for part in parts if part)
 
@@ -146,11 +152,9 @@ def _answer(
         return f"Refused: it would support itself ({' → '.join(short(name) for name in standing.circle)})."
     if standing.status.supports:
         name, status = standing.weakest
+        told = f"Assumed for a person's reason: {short(name)}. " if status is Status.JUSTIFIED else ""
         hypotheses = len(standing.hypotheses)
-        rest = f"; it rests on {count(hypotheses, 'hypothesis', 'hypotheses')}" if hypotheses else ""
-        if status is Status.JUSTIFIED:
-            return f"Below it, {short(name)} is assumed for a person's reason{rest}."
-        return f"The weakest claim under it is {short(name)}, {status.value}{rest}."
+        return told + (f"It rests on {count(hypotheses, 'hypothesis', 'hypotheses')}." if hypotheses else "").strip()
     if standing.direct and standing.status is not Status.MISSING:
         own = [name for name in own_obligations if name in standing.below]
         where = ", ".join(short(name) for name in own or standing.below) or "its evidence"

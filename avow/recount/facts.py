@@ -125,7 +125,7 @@ class Facts:
         """At least and at most so many, as the records have it; None for a kind that is not known here."""
         within = self.guarantees
         own = [v for v in self.views if v["obligation"]["kind"] == "requirement"]
-        sampled = [{support(r) in ("tested", "monitored") for r in supporting(v)} for v in (*within, *own)]
+        sampled = [{support(r) in ("tested", "monitored") for r in supporting(v)} for v in self.views]
         read = [{support(r) == "reviewed" for r in supporting(v)} for v in within]
         model = [{_way(r)[1] == "model" for r in supporting(v)} for v in within]
         hand = [{r["link"] != "generated" for r in supporting(v)} for v in within]

@@ -13,14 +13,26 @@ from avow.evidence.record import Evidence
 from avow.evidence.status import Status
 from avow.report.short import escaped, markdown_head
 from avow.report.source import plain_lines
-from avow.report.wording import NO_HAZARD, bound_text, clean, gate_line, hazard_rows, mutation, open_line, where, worth
+from avow.report.wording import (
+    NO_HAZARD,
+    bound_text,
+    clean,
+    gate_line,
+    hazard_rows,
+    mutation,
+    open_line,
+    remark_line,
+    where,
+    worth,
+)
 
 _BOUNDED = (Status.CHECKED, Status.TESTED, Status.MONITORED)
 """The statuses that are shown with their bounds."""
 
 
 def render_markdown(case: Case) -> str:
-    """The summary: the five answers, the gates, the open items, the table, and what is not shown."""
+    """The summary: the five answers, the gates, failures and gaps, remarks, the table, and what is not shown."""
+    remarks = sorted((i for i in case.open_items if i.advice), key=lambda i: i.kind != REMARK)
     parts = [
         f"# {escaped(case.title)}: assurance report",
         *markdown_head(case),
@@ -34,7 +46,7 @@ def render_markdown(case: Case) -> str:
                 for g in case.gates
             ),
         ),
-        "## Open items",
+        "## Failures and gaps",
         _table(
             ("", "claim", "why", "what was found", "next"),
             (
@@ -50,7 +62,9 @@ def render_markdown(case: Case) -> str:
             ),
         ),
         escaped(open_line(case)),
-        *_remarks(case),
+        "## Open remarks",
+        remark_line(case),
+        "\n".join(f"- {escaped(i.title or short(i.claim))} ({escaped(i.text)})" for i in remarks[:SUMMARY_ROWS]),
         "## Hazards",
         _table(
             ("hazard", "what may happen", "severity", "how far it is mitigated"),
@@ -79,15 +93,6 @@ def render_markdown(case: Case) -> str:
         *_contracts(case),
     ]
     return "\n\n".join(part for part in parts if part) + "\n"
-
-
-def _remarks(case: Case) -> Iterable[str]:
-    """Remarks on how the contracts are written, brackets first: a verdict's meaning depends on how a formula is
-    read."""
-    found = [item for item in case.open_items if item.kind == REMARK]
-    if found:
-        yield "## Remarks on contracts and models"
-        yield "\n".join(f"- {escaped(item.title)} ({escaped(item.text)})" for item in found[:SUMMARY_ROWS])
 
 
 def _contracts(case: Case) -> Iterable[str]:

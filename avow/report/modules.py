@@ -14,7 +14,6 @@ from avow.assurance.naming import derivation_claim
 from avow.base.plain import count, listed
 from avow.base.records import dataclass
 from avow.evidence.obligation import Kind
-from avow.evidence.status import Status
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,7 +25,7 @@ class RequirementModule:
     away: tuple[tuple[str, str, str], ...]
     """(node, its name for readers, the number of its guarantees that count here, each or its counts by status)."""
     conditions: str
-    """The number of conditions of the composition that are met here; empty if there are none."""
+    """How the conditions of the composition stand that are needed here; empty if there are none."""
     supposes: tuple[str, ...]
     """Numbers of assumptions."""
     failing: tuple[str, ...]
@@ -52,9 +51,8 @@ def requirement_modules(case: Case) -> tuple[RequirementModule, ...]:
                 of = f"{len(own)} of {count(total[node.name], 'guarantee')}"
                 away.append((node.name, node.title, f"{of}: {_standings(own)}"))
         side = [v for v in under if v.obligation.kind is Kind.COMPOSITION]
-        assumed = sum(v.status is Status.JUSTIFIED for v in side)
-        shown = sum(v.standing.supports for v in side) - assumed
-        conditions = f"{shown} of {count(len(side), 'condition')} shown, {assumed} assumed" if side else ""
+        stand = ", ".join(f"{many} {said}" for said, many in Counter(v.standing for v in side).items())
+        conditions = f"{count(len(side), 'condition')}: {stand}" if side else ""
         supposes = tuple(numbers[key] for key in r.supposes if key in numbers)
         failing = r.failing or r.below
         because = _because(case, r) + (f" F{r.rate.words[1:]}." if r.rate and r.level.holds else "")

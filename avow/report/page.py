@@ -40,6 +40,7 @@ from avow.report.wording import history
 KINDS = (Kind.GUARANTEE, Kind.SANITY, Kind.COMPOSITION, Kind.REQUIREMENT, Kind.PROGRAM, Kind.WELL_FORMED)
 
 
+_Stands = list[tuple[str, str, int]]
 _Matrix = list[tuple[str, str, list[tuple[ObligationView, list[Status | None]]]]]
 
 
@@ -133,7 +134,7 @@ def render_page(case: Case, json_digest: str = "") -> str:
     return _fill(
         "claims.html.j2",
         case,
-        groups=[(node, _stands(view.standing for view in views), views) for node, views in nodes.items()],
+        groups=[(node, _stands(views), views) for node, views in nodes.items()],
         total=len(case.obligations),
         counts=_counts(case.obligations),
         matrix=matrix if len(case.guarantees) <= GUARANTEE_ROWS else [],
@@ -141,6 +142,7 @@ def render_page(case: Case, json_digest: str = "") -> str:
         open_items=listed,
         resting=resting(case),
         open_line=wording.open_line(case),
+        remark_line=wording.remark_line(case),
         open_kinds=list(Counter(item.kind for item in listed).items()),
         do_first=None if case.good else next((i for i in listed if i.suggestion and not i.handled), None),
         findings={view.id: _found(view) for view in case.obligations},
@@ -306,22 +308,22 @@ def _by_item(items: Sequence[OpenItem]) -> dict[str, list[OpenItem]]:
     return found
 
 
-def _counts(views: Sequence[ObligationView]) -> list[tuple[str, list[tuple[Status, int]], int]]:
-    """GNATprove's table: for each kind of claim, the number of claims with each status."""
+def _counts(views: Sequence[ObligationView]) -> list[tuple[str, _Stands, int]]:
+    """GNATprove's table: for each kind of claim, how many stand how."""
     table = []
     for kind in KINDS:
         for advice in (False, True):
-            of_kind = [v.status for v in views if v.obligation.kind is kind and v.advice is advice]
+            of_kind = [v for v in views if v.obligation.kind is kind and v.advice is advice]
             if of_kind:
                 label = f"{kind}, as advice" if advice else kind.value
                 table.append((label, _stands(of_kind), len(of_kind)))
     return table
 
 
-def _stands(statuses: Iterable[Status]) -> list[tuple[Status, int]]:
-    """The number of claims with each status, best first."""
-    found = Counter(statuses)
-    return [(status, found[status]) for status in Status if found[status]]
+def _stands(views: Iterable[ObligationView]) -> _Stands:
+    """How the claims stand, best first, in the word and colour that each one's own line has."""
+    found = Counter((tuple(Status).index(v.standing), v.word, wording.tone(v.standing)) for v in views)
+    return [(word, tone, number) for (_, word, tone), number in sorted(found.items())]
 
 
 def _used_methods(case: Case) -> list[str]:
@@ -366,15 +368,15 @@ def _justified(case: Case) -> list[tuple[ObligationView, Any]]:
     ]
 
 
-def resting(case: Case) -> dict[str, list[tuple[Status, int]]]:
-    """The number of claims of each status that each supported requirement rests on, derivations included: the weakest
-    status alone does not show that five others were only tested. Empty if computing it would take too long."""
+def resting(case: Case) -> dict[str, _Stands]:
+    """How the claims stand that each supported requirement rests on, derivations included: the weakest one alone does
+    not show that five others were only tested. Empty if computing it would take too long."""
     if len(case.requirements) * len(case.obligations) > SUPPORT_STEPS:
         return {}
     below = {view.id: view.rests_on for view in case.obligations}
     below |= {derivation_claim(d.derivation.name): d.rests_on for d in case.derivations}
     below |= {requirement_claim(r.id): (*r.rests_on, *r.obligations) for r in case.requirements}
-    statuses = {view.id: view.status for view in case.obligations}
+    views = {view.id: view for view in case.obligations}
     told = {}
     for requirement in case.requirements:
         seen: set[str] = set()
@@ -384,5 +386,5 @@ def resting(case: Case) -> dict[str, list[tuple[Status, int]]]:
             if name not in seen:
                 seen.add(name)
                 stack += below.get(name, ())
-        told[requirement.id] = _stands(statuses[name] for name in seen if name in statuses)
+        told[requirement.id] = _stands(views[name] for name in seen - {*requirement.obligations} if name in views)
     return told

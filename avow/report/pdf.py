@@ -11,7 +11,6 @@ from avow.assurance.answers import Assumption, SupposedLine
 from avow.assurance.changes import baseline_of
 from avow.assurance.model import Case, ObligationView, SourceView
 from avow.assurance.naming import short
-from avow.assurance.remarks import REMARK
 from avow.backend_kit.timeline import in_words, picture, timelines
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.plain import listed
@@ -103,7 +102,7 @@ def _data(case: Case) -> dict[str, Any]:
             for i in case.open_items[:PDF_OBLIGATIONS]
             if not i.advice
         ],
-        "remarks": [f"{i.title} ({i.text})" for i in case.open_items if i.kind == REMARK][:PDF_OBLIGATIONS],
+        "remarks": [f"{i.title or short(i.claim)} ({i.text})" for i in case.open_items if i.advice][:PDF_OBLIGATIONS],
         "matrix": [
             {
                 "name": node,

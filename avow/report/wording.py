@@ -150,13 +150,17 @@ def clean(text: str) -> str:
 
 
 def open_line(case: Case) -> str:
-    """How the open items and the plan's expected findings add up; empty if the plan handles none of them."""
-    said = {advice: sum(i.advice is advice and bool(i.handled) for i in case.open_items) for advice in (False, True)}
-    if not any(said.values()):
-        return ""
-    rest = sum(not i.advice and not i.handled for i in case.open_items)
-    advice = f", as it does of {count(said[True], 'item')} of advice" if said[True] else ""
-    return f"The plan speaks of {said[False]} of them{advice}; of {rest or 'none'} it does not."
+    """How many failures and gaps the plan expects or accepts; empty if it does so of none."""
+    said = sum(bool(i.handled) and not i.advice for i in case.open_items)
+    rest = sum(not i.handled and not i.advice for i in case.open_items)
+    return f"The plan expects or accepts {said} of them; of {rest or 'none'} it says nothing." if said else ""
+
+
+def remark_line(case: Case) -> str:
+    """The number of remarks, as the first screen has it, and of those that the plan handles."""
+    said = [bool(i.handled) for i in case.open_items if i.advice]
+    handled = f", and {sum(said)} that the plan expects or accepts" if any(said) else ""
+    return f"{count(len(said) - sum(said), 'open remark')}{handled}: no gate fails for them."
 
 
 def banner_tone(case: Case) -> str:
