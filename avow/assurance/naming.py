@@ -98,7 +98,7 @@ def is_foundation(obligation: Obligation) -> bool:
 
 
 def rerun(obligation: Obligation, method: str) -> str:
-    """The command that re-runs a method on a claim, from the workspace's folder."""
+    """The command that re-runs a method on a claim and renders the report of it, from the workspace's folder."""
     o = obligation
     match o.kind:
         case Kind.SANITY:
@@ -109,4 +109,4 @@ def rerun(obligation: Obligation, method: str) -> str:
             task = f"check:{o.system}"
         case Kind.GUARANTEE | Kind.PROGRAM:
             task = f"discharge:{o.system}:{o.node}:{method}"
-    return f"AVOW_FRESH=1 doit {shlex.quote(task)}"
+    return f"AVOW_FRESH=1 doit {shlex.quote(task)} && doit {shlex.quote(f'report:{o.system}')}"

@@ -123,7 +123,7 @@ def test_a_left_out_refutation_is_found(place: Path) -> None:
             o["evidence"] = [i for i in o["evidence"] if i["entry"]["evidence"]["verdict"] != "refuted"]
 
     edit(place / "report/report.json", lie)
-    assert any("does not show" in line for line in found(place))
+    assert any("does not show (`doit report:rover` renders it again)" in line for line in found(place))
 
 
 def test_newer_evidence_makes_a_report_old(place: Path) -> None:

@@ -145,7 +145,7 @@ def test_the_trace_leads_from_source_and_hazard_to_the_command_that_asks_again()
     row = next(row for row in trace(found) if row.method == "hoare")
     assert (row.source, row.hazards, row.requirement) == ("SRS 4.2", "H1", "R")
     assert (row.output, row.digest) == ("artifacts/rover/n/hoare/n.smt2", "ab" * 32)
-    assert row.rerun == "AVOW_FRESH=1 doit discharge:rover:n:hoare"
+    assert row.rerun == "AVOW_FRESH=1 doit discharge:rover:n:hoare && doit report:rover"
 
 
 SECURE = """node remote { inputs() outputs( order : REAL ) topics( std_msgs/Float64 order )
