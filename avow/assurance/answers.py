@@ -149,7 +149,8 @@ class Assumption:
     def term(self) -> str:
         """``A. Person, 2026-11-21, until 2030-12-31``: who is responsible for it, since when, until when."""
         ended = "expired" if self.expired else "until"
-        parts = (self.who or "no owner", self.date, f"{ended} {self.until}" if self.until else "no last day")
+        last = "until a text changes" if self.sort is Sort.MEANING and self.who else "no last day"
+        parts = (self.who or "no owner", self.date, f"{ended} {self.until}" if self.until else last)
         return ", ".join(part for part in parts if part)
 
     @property

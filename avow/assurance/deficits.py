@@ -32,7 +32,7 @@ _WORDS = {
     "nan": ("claim{s} broken by NaN or infinity", "broken by NaN", "The contract is about numbers only."),
     "read": ("guarantee{s} on a person's reading only", "only read", "No tool has looked at them."),
     "single": ("guarantee{s} with one method only", "by one method", "An error of that tool would not be noticed."),
-    "idle": ("guarantee{s} that serve no requirement", "serving none", "No requirement needs them."),
+    "idle": ("guarantee{s} serving no requirement", "serving none", "No requirement needs them."),
     "underrated": (
         "guarantee{s} of lower criticality than a hazard's severity",
         "rated below a hazard",

@@ -130,6 +130,7 @@ def answers(
     asked = [gate for gate in gates if not gate.idle]
     good = sum(gate.passed for gate in asked)
     idle = f", {len(gates) - len(asked)} not asked" if len(asked) < len(gates) else ""
+    idle += " of known-bad material" if idle and strict else ""
     kinds = len(deficits)
     by_node: dict[str, list[ObligationView]] = {node.name: [] for node in nodes}
     for view in views:
@@ -318,7 +319,7 @@ def _owners(assumptions: Sequence[Assumption]) -> str:
     all_end = len(ends) == 1 and all(s.until for s in owned)
     until = f", until {ends[0]}" if all_end else f"; the first ends {ends[0]}" if ends else ""
     lasting = sum(not s.until for s in owned)
-    return f"{named}{since}{until}" + (f"; until a text changes: {lasting}" if lasting else "")
+    return f"{named}{since}{until}" + (f"; {lasting} end{'s' * (lasting == 1)} when a text changes" if lasting else "")
 
 
 def _changed(changes: Changes) -> tuple[tuple[str, str], ...]:

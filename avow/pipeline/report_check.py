@@ -219,8 +219,8 @@ def _ledger(case: Case, ledger: Ledger, root: Path | None) -> Iterable[str]:
     if newer:
         first = newer[0].evidence
         what = f"{first.obligation}, {first.method}"
-        again = f"`doit report:{case.system}` renders it again"
-        yield f"the ledger has {len(newer)} record(s) that the report does not show ({again}); first: {what}"
+        anew = f"`doit report:{case.system}` renders it again"
+        yield f"the ledger has {len(newer)} record(s) that the report does not show ({anew}); first: {what}"
     if newer:
         return
     if case.ledger_head != ledger.head:

@@ -16,6 +16,8 @@ from avow.recount.facts import HOLDS, Facts
 from avow.recount.page import CELL, Block
 
 _Numbers = tuple[str | None, ...] | None
+HAZARD = 45
+"""Characters of a hazard's text on the first screen."""
 _SORTS = {
     "the world": "the world",
     "the platform": "the platform",
@@ -38,7 +40,7 @@ _DEFICITS = {
     "claims? broken by NaN or infinity": "nan",
     "guarantees? on a person's reading only": "read",
     "guarantees? with one method only": "single",
-    "guarantees? that serve no requirement": "idle",
+    "guarantees? serving no requirement": "idle",
     "guarantees? of lower criticality than a hazard's severity": "underrated",
     "guarantees? translated by a person for the tool": "tied",
     "planned methods? without an answer": "unrun",
@@ -144,9 +146,17 @@ def _hazard(facts: Facts, match: re.Match[str], _block: Block) -> _Numbers:
 
 
 def _dangers(facts: Facts, match: re.Match[str], _block: Block) -> _Numbers:
-    """The hazards of a level, with their severities, and how many are not named."""
-    names = [f"{h['hazard']['id']} ({h['hazard']['severity']})" for h in facts.hazards if h["level"] == match[1]]
-    return match[1], ", ".join(" ".join(n.split()) for n in names[:6]), str(len(names) - 6) if names[6:] else None
+    """The hazards of each level, and how many of it are not named; then, of many requirements, how many are not."""
+    told = []
+    for level in ("refuted", "not shown", *reversed(HOLDS)):
+        own = [h["hazard"] for h in facts.hazards if h["level"] == level]
+        texts = [h["text"] if len(h["text"]) <= HAZARD else h["text"][: HAZARD - 1].rstrip() + "…" for h in own]
+        names = [f"{h['id']} {text} ({h['severity']})" for h, text in zip(own[:3], texts, strict=False)]
+        more = f" and {len(own) - 3} more" if own[3:] else ""
+        told += [" ".join(f"{level} {', '.join(names)}{more}".split())] if own else []
+    true = f"{'; '.join(told)}." if told else "none is declared."
+    left = re.findall(r"\d+", match[1].removeprefix(true))
+    return match.groups() if match[1].startswith(true) and left in ([], [str(len(facts.requirements) - 3)]) else (true,)
 
 
 def _seen(facts: Facts, match: re.Match[str], block: Block) -> _Numbers:
@@ -294,8 +304,7 @@ RULES = (
     _rule("head", rf"(\d+) ({_LEVELS})(?= [·␟]|, | $)", _level),
     _rule("q1", rf"^ ␟ (\d+) ({_LEVELS}) ␟ (.*?) $", _named),
     _rule("q1", r"^ (␟ .* ␟ )(\d+) $", _row),
-    _rule("q1", r"(\d+) more in words", _whole(lambda f: len(f.requirements) - 3)),
-    _rule("q1", rf"({_LEVELS}) ((?:[^();]* \([^()]*\),?)+)(?: and (\d+) more)?(?=[;.])", _dangers),
+    _rule("q1", r"^ Hazards: (.*) $", _dangers),
     _rule("q2", rf"(\d+) ({_STATUS})\b", _basis),
     _rule("q2", r"and (\d+) nodes? on no less", _whole(lambda f: len(f.case["nodes"]) - 8)),
     _rule("q3", r"and (\d+) more claims?", _whole(lambda f: len(f.wrong()) - min(3, f.wronged()))),
@@ -307,7 +316,7 @@ RULES = (
     _rule("q4", r"(\d+)(?= of \d+ with an owner and an end)", _whole(lambda f: len(f.owned_ones()))),
     _rule("q4", r"of (\d+) with an owner and an end", _whole(lambda f: len(f.assumptions))),
     _rule("q4", r"([^,:]+?) \((\d+)\)(?=[,;.]| and )", _owners),
-    _rule("q4", r"until a text changes: (\d+)", _whole(lambda f: sum(not a["until"] for a in f.owned_ones()))),
+    _rule("q4", r"(\d+) ends? when a text changes", _whole(lambda f: sum(not a["until"] for a in f.owned_ones()))),
     _rule("q4", rf"assumed since {_DAY}(?: to {_DAY})?", _days),
     _rule("q4", rf"(?:until|the first ends) {_DAY}", _days),
     _rule("q4", r"\bA(\d+)(?= )", _says),
@@ -328,8 +337,12 @@ RULES = (
         r"(\d+) of (\d+) answered by two solvers",
         lambda f, _m, _b: (str(f.proofs("certified-2")), str(f.proofs("certified-1", "certified-2"))),
     ),
-    _rule("q7", r"(?:[(,] ?)([^(),]+) \((\d+)\)", lambda f, m, _b: (m[1], str(f.tools()[m[1].strip()]))),
-    _rule("q7", r"\) and (\d+) more\)", _whole(lambda f: len(f.tools()) - 9)),
+    _rule(
+        "q7",
+        r"(?:[(,] ?)([^(),]+): (\d+) answers?(?=[,)]| and )",
+        lambda f, m, _b: (m[1], str(f.tools()[m[1].strip()])),
+    ),
+    _rule("q7", r"answers? and (\d+) more\)", _whole(lambda f: len(f.tools()) - 9)),
     _rule("q7", r"without an owner \((.*?)(?: and (\d+) more)?\)", _bare),
     _rule("signature", r"assumptions (A\d+ to A\d+)", lambda f, _m, _b: (f"A1 to A{len(f.assumptions)}",)),
     _rule("signature", r"assumption A(\d+)\b", _whole(lambda f: len(f.assumptions))),

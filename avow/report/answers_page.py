@@ -174,7 +174,8 @@ def render_index(cases: Sequence[Case], earlier: Sequence[str] = ()) -> str:
         rest = f"; {len(cases) - len(relied)} only examined" if len(relied) < len(cases) else ""
         tone = min((case.answers.tone for case in relied), key=lambda t: t.rank)
         least = max((case.answers.headline for case in relied), key=tuple(Level).index)
-        line = f"{count(len(relied), 'system')}, {'at least ' * (len(relied) > 1)}{least}{rest}"
+        lowest = "the lowest verdict: " if len(relied) > 1 else ""
+        line = f"{count(len(relied), 'system')}, {lowest}{least}{rest}"
     if earlier:
         line += f"; {count(len(earlier), 'report')} as of an earlier state"
         tone = Tone.AMBER if tone is Tone.GREEN else tone

@@ -13,9 +13,10 @@ from avow.assurance import naming
 from avow.assurance.answers import Level, Tone
 from avow.assurance.hazards import WORST_FIRST
 from avow.assurance.model import Case, EvidenceView, ObligationView, RequirementView
+from avow.assurance.naming import cut
 from avow.base.files import sha256
 from avow.base.plain import count, listed
-from avow.base.tuning.shown import DETAILS, FORMULA_COLUMNS
+from avow.base.tuning.shown import DETAILS, FORMULA_COLUMNS, HAZARD_CHARACTERS
 from avow.evidence.obligation import SYSTEM_LEVEL, Kind
 from avow.evidence.record import RETRY, Evidence
 from avow.evidence.status import Status, weigh
@@ -353,12 +354,13 @@ def weakest(requirement: RequirementView) -> str:
 
 
 def dangers(case: Case) -> list[tuple[Tone, Level, str]]:
-    """(colour, level, ``H1 (critical), H3 (marginal)``) of the hazards, the least mitigated first."""
+    """(colour, level, ``H1 The robot burns (critical), H3 It drifts (marginal)``) of the hazards, the least mitigated
+    first."""
     found: list[tuple[Tone, Level, str]] = []
     for level in WORST_FIRST:
         if own := [view for view in case.hazards if view.level is level]:
-            names = [f"{view.hazard.id} ({view.hazard.severity})" for view in own]
-            found.append((min((view.tone for view in own), key=lambda tone: tone.rank), level, listed(names, 6)))
+            names = [f"{h.id} {cut(h.text, HAZARD_CHARACTERS)} ({h.severity})" for h in (view.hazard for view in own)]
+            found.append((min((view.tone for view in own), key=lambda tone: tone.rank), level, listed(names, 3)))
     return found
 
 

@@ -206,7 +206,7 @@ def _tested(outcome: Outcome, answer: Answer, own: Tried, wanted: int, seed: int
     if hits:
         bound["triggered"] = least
         bound["failure_probability_when_triggered_below"] = failure_bound(least)
-    replayed = f", {answer.replayed} that refuted it or a neighbour before" if answer.replayed else ""
+    replayed = f", {answer.replayed} that once refuted a guarantee of this node" if answer.replayed else ""
     if answer.replayed:
         bound["replayed"] = answer.replayed
     chance = f"95 %: below {shown_bound(least)} of such {'cases' if answer.runs is None else 'runs'} fail"

@@ -369,7 +369,7 @@ class _Work:
         bound |= {"confidence": tuning.CONFIDENCE, "triggered": triggered}
         bound["failure_probability_below"] = failure_bound(count.runs)
         bound["failure_probability_when_triggered_below"] = failure_bound(triggered)
-        before = f", {self.replayed} that refuted it or a neighbour before" if self.replayed else ""
+        before = f", {self.replayed} that once refuted a guarantee of this node" if self.replayed else ""
         part = self.unanswered / self.messages
         before += f", {self.unanswered} messages without an answer ({part:.0%})" if self.unanswered else ""
         summary = (

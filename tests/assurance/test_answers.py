@@ -438,7 +438,7 @@ def test_each_tool_with_an_answer_that_counts_is_to_be_trusted_and_a_refuted_con
     made += [evidence(claims[2], Verdict.CHECKED, "ajpf"), evidence(contract, Verdict.REFUTED, "sanity")]
     found = case(system({"a": ["g", "h", "k"]}), [*claims, contract], made).answers
     (line,) = (line for line in found.trusted if line.what == "tools whose answers have no certificate")
-    assert all(f"{record.tool_told} (1)" in line.which for record in made[:3])
+    assert all(f"{record.tool_told}: 1 answer" in line.which for record in made[:3])
     assert found.based_on[0].words.endswith("; contract refuted")
 
 
@@ -457,7 +457,7 @@ def test_which_assumptions_there_are_and_who_answers_for_them_is_said_in_a_line(
     assert _owners(said[:1]) == "A. Person, until 2027-01-01"
     assert _owners([replace(said[0], who="")]) == ""
     validated = replace(said[0], sort=Sort.MEANING, until="")
-    assert _owners([said[1], validated]) == "A. Person; the first ends 2027-01-02; until a text changes: 1"
+    assert _owners([said[1], validated]) == "A. Person; the first ends 2027-01-02; 1 ends when a text changes"
     made = [replace(one, date=f"2026-11-{20 + at}") for at, one in enumerate(said[:2])]
     assert _owners(made[:1]) == "A. Person, assumed since 2026-11-20, until 2027-01-01"
     assert _owners(made) == "A. Person, assumed since 2026-11-20 to 2026-11-21; the first ends 2027-01-01"
@@ -575,7 +575,7 @@ def test_requirements_on_another_guarantee_of_the_weakest_node_are_counted_besid
         assert view.weakest is not None
         assert set(view.weakest.claims) in ({node[0].id}, set())
         assert view.weakest.name in ("a.g", "R1"), "as the weakest evidence of the whole case"
-    assert whole.answers.verdict == "Argued (no overall failure rate)"
+    assert whole.answers.verdict == "Argued (failure rate unknown)"
     alone = case(system({"a": ["g"]}, requirements=asked[:1]), node[:1], made[:1]).answers.weakest
     assert alone is not None
     assert alone.others == ""

@@ -90,12 +90,13 @@ def test_each_gate_that_fails_is_in_the_banner_and_each_hazard_on_the_first_scre
     failures = tuple(Failure(f"Gate {at}", "why", "") for at in range(4))
     page = render_answers(replace(found, answers=replace(found.answers, failures=failures)))
     told = " ".join(re.sub(r"<[^>]*>", " ", page).split())
-    assert "Gate 1: fails." in told
+    assert "“Gate 1” fails." in told
     assert "Also fail: Gate 2; Gate 3 ." in told
-    assert "✘ not shown H1 (critical), H2 (critical), H3" in told
-    assert "H6 (critical) and 2 more ; ◐ argued H0 (critical) ." in told
+    assert "✘ not shown H1 It burns (critical), H2 It burns (critical), H3" in told
+    assert "H3 It burns (critical) and 5 more ; ◐ argued H0 It burns (critical) ." in told
+    assert f"{found.gates[0].title}: {found.gates[0].state}." in page, "the gates by name, under the pointer"
     assert "◐ argued argued: a person&#39;s word" in told
-    assert pdf_data(found)["first"]["hazards"].startswith("✘ not shown: H1 (critical)")
+    assert pdf_data(found)["first"]["hazards"].startswith("✘ not shown: H1 It burns (critical)")
     assert "| H8 | It burns | critical | ✘ no mitigation |" in render_markdown(found)
     bare = make_case(system({"n": ["g"]}, requirements=[asked]), [target], [evidence(target)])
     assert "none is declared" in render_answers(bare)

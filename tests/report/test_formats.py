@@ -361,7 +361,7 @@ def test_the_index_does_not_call_known_bad_material_passed() -> None:
         assert "WARNED: 1 finding known" in str(made[name]), name
     assert any("WARNED: 1 finding known" in line for line in terminal_lines(examined))
     assert (examined.answers.tone, good.answers.tone) == (Tone.RED, Tone.GREY)
-    assert examined.answers.gates.endswith(" not asked")
+    assert examined.answers.gates.endswith(" not asked of known-bad material")
     assert "✔" not in text.split("<main")[0]
     relied = case(system({"n": ["g"]}, requirements=[Requirement("R", "t", None, None, ("n.g",))]), [g], [evidence(g)])
     assert "1 system, argued; 1 only examined" in render_index([examined, relied])
@@ -370,7 +370,7 @@ def test_the_index_does_not_call_known_bad_material_passed() -> None:
         [g, own := obligation("system", Kind.REQUIREMENT, "R", clauses=("n.g",))],
         [evidence(g), evidence(own, method="compose")],
     )
-    assert "2 systems, at least argued; 1 only examined" in render_index([examined, relied, better])
+    assert "2 systems, the lowest verdict: argued; 1 only examined" in render_index([examined, relied, better])
     assert "1 system, shown of models" in render_index([better])
 
 
