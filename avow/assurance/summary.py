@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 
 from avow.assurance.facts import Facts
 from avow.assurance.model import Currency, DerivationView, Handled, ObligationView, OpenItem, RequirementView
@@ -176,11 +177,17 @@ def _summary(view: ObligationView) -> str:
 
 
 def refutation(view: ObligationView) -> tuple[str, str]:
-    """The method that refuted a claim last, and its counterexample or summary; both empty if none did."""
+    """The method that refuted a claim last, and its counterexample, the values that the formula names first, or its
+    summary; both empty if none did."""
     record = next((r for r in reversed(view.records) if weigh(r).refuted), None)
     if record is None:
         return "", ""
-    return record.method, (record.counterexample.text() if record.counterexample else "") or record.summary
+    example, formula = record.counterexample, view.obligation.formula
+    if example is None:
+        return record.method, record.summary
+    names = {name: formula.find(name) % (len(formula) + 1) for name, _ in example.values}  # -1: after all others
+    ordered = replace(example, values=tuple(sorted(example.values, key=lambda value: names[value[0]])))
+    return record.method, ordered.text() or record.summary
 
 
 def _has_vacuous(view: ObligationView) -> bool:

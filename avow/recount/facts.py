@@ -51,7 +51,7 @@ class Facts:
                 _id(v),
             )
             yield from (r["numbers"] for r in records(v))
-            for told in map(_refuting, records(v)):
+            for told in (_refuting(record, v["obligation"]["formula"]) for record in records(v)):
                 yield from (told, told[:71].rstrip() + "…")
         yield from (f"{name} {version}" for name, version in self.case["kernel"]["solvers"].items())
         yield from self.tools()
@@ -211,10 +211,12 @@ def supporting(view: Json) -> list[Json]:
     return [record for record in records(view) if support(record) and view["status"] in _SUPPORTS]
 
 
-def _refuting(record: Json) -> str:
-    """What a refuting record found, as the page has it."""
+def _refuting(record: Json, formula: str) -> str:
+    """What a refuting record found, as the page has it: first the values that the formula names, in its order."""
     found = record["counterexample"] or {"values": (), "explanation": ""}
-    values = ", ".join(f"{name} = {value}" for name, value in found["values"] if not name.startswith("("))
+    place = {name: formula.find(name) if name in formula else len(formula) for name, _ in found["values"]}
+    shown = sorted(found["values"], key=lambda value: place[value[0]])
+    values = ", ".join(f"{name} = {value}" for name, value in shown if not name.startswith("("))
     example = ": ".join(part for part in (values, found["explanation"]) if part)
     return (example or record["summary"]) if record["verdict"] == "refuted" else ""
 

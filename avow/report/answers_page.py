@@ -33,6 +33,13 @@ WORDS = (
     ("assumption", "something that requirements rest on without its being shown"),
     ("deficit", "a reason for which the report says less than it seems to"),
     ("policy, gate", "what this system's owners ask of the evidence, demand by demand"),
+    ("open remark", "something to know about a contract or a model; no gate fails for it"),
+    ("triggered run", "a run, or case, in which a guarantee's condition was met"),
+    ("unanswered input", "an input for which the node gave no output: the evidence says nothing of it"),
+    ("percept", "what an agent's program gets to know of its environment"),
+    ("tie", "how the thing that a tool checked was made from the formula: by translation, by a table, or by a person"),
+    ("kernel", "a small program that establishes a proof again: certified-1 with one solver, certified-2 with two"),
+    ("bow-tie", "a picture of a hazard between its causes and its consequences, with what mitigates it"),
 )
 
 

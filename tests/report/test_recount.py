@@ -45,7 +45,8 @@ def examined() -> Case:
     """A refutation that the plan expects, with a counterexample to be cut; gates that are not asked."""
     target = guarantee("n", "g")
     subject = system({"n": ["g"]}, policy="reproduction", expected=[Finding("n/guarantee/g", "refuted")])
-    values = tuple((f"in.x{at}", str(at)) for at in range(20))
+    values = (*((f"in.x{at}", str(at)) for at in range(20)), ("in.r", "127"))
+    target = replace(target, formula="0 ≤ in.r < 120")
     return make_case(subject, [target], [evidence(target, Verdict.REFUTED, counterexample=Counterexample(values))])
 
 
@@ -152,6 +153,10 @@ def test_changes_since_a_signature_are_borne_out_and_changed_ones_found() -> Non
             lies = [(near, lie) for near, lie in changed(page) if lie.startswith(before) and lie.endswith(after)]
             assert [near for near, lie in lies if not recounted(lie, data)] == []
     assert found >= {*KINDS} - {"expired"}
+
+
+def test_a_counterexample_begins_with_what_the_formula_reads() -> None:
+    assert "(in.r = 127, in.x0 = 0," in examined().answers.refuted
 
 
 def test_each_kind_of_deficit_is_recounted() -> None:
