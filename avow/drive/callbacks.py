@@ -28,7 +28,20 @@ from .turns import ORDERS, Turns
 REQUEST, RESPONSE = "_Request", "_Response"
 ACTION = ("_Goal", "_Result", "_Feedback")
 """The ends of the names of the message types of a service, and of an action."""
-STATE = ("said", "heard", "spoken", "due", "together", "waiting", "dropped", "calls", "taken", "_order")
+STATE = (
+    "said",
+    "kept",
+    "latched",
+    "heard",
+    "spoken",
+    "due",
+    "together",
+    "waiting",
+    "dropped",
+    "calls",
+    "taken",
+    "_order",
+)
 """The attributes that loading the file may change, and each run changes."""
 
 
@@ -60,6 +73,10 @@ class Driven(Refusals, Messages, Turns):
         """A response's number among all messages → the call that it answers."""
         self.services: dict[Any, str] = {}
         """Class of a service or an action → its type (``package/Type``)."""
+        self.kept: dict[str, Any] = {}
+        """Topic → its last message."""
+        self.latched: dict[str, None] = {}
+        """The topics that the class itself latches."""
         self.most: int = spec["most"]
         self.ran = self.number = self._order = 0
         self._loaded: dict[str, Any] = {}
@@ -139,19 +156,32 @@ class Driven(Refusals, Messages, Turns):
 
     def pause(self, nanoseconds: int) -> None:
         """The running callback sleeps."""
+        self.wait(lambda act: self.later(self.now + nanoseconds, lambda: act(None)), "time.sleep")
+
+    def wait(self, begin: Callable[[Callable[[Any], None]], Any], called: str) -> Any:
+        """The running callback waits: `begin` takes the function that ends this, and is given what `wait` returns."""
         turn = self.running
         if turn is None or threading.current_thread() is not turn:
-            raise self.refuse("time.sleep")
-        self.later(self.now + nanoseconds, lambda: self.wake(turn))
-        turn.sleep()
+            raise self.refuse(called)
+        found: list[Any] = []
 
-    def hear(self, topic: Any, kind: Any, act: Callable[[Any], Any]) -> tuple[str, Any]:
-        """The topic's whole name, and what is in `heard` for it."""
+        def end(result: Any) -> None:
+            found.append(result)
+            self.wake(turn)
+
+        begin(end)
+        turn.sleep()
+        return found[0]
+
+    def hear(self, topic: Any, kind: Any, act: Callable[[Any], Any], *, late: bool = False) -> tuple[str, Any]:
+        """The topic's whole name, and what is in `heard` for it. `late`: it gets the last message from before."""
         whole, name = self.whole(topic), self.type_of(kind)
         others = self.heard.get(whole, ())
         if any(other != name for other, _ in others):
             raise TypeError(f"{whole} is {others[0][0]}, and heard as {name}")
         self.heard[whole] = (*others, (name, act))
+        if whole in self.kept and (late or whole in self.latched):
+            self.later(self.now, lambda data=self.kept[whole]: act(self.value({"n": name}, data)))  # type: ignore[misc]
         return whole, self.heard[whole][-1]
 
     def speak(self, topic: Any, kind: Any) -> str:
@@ -168,10 +198,12 @@ class Driven(Refusals, Messages, Turns):
             self.pause(0)
         data = self.data({"n": self.spoken[topic]}, message, topic)
         self.said.append([topic, self.now, data, len(self.taken), call])
+        self.kept[topic] = data
         for _, act in self.heard.get(topic, ()):
             self.later(self.now, lambda act=act: act(self.value({"n": self.spoken[topic]}, data)))  # type: ignore[misc]
 
     def deliver(self, topic: str, data: Any) -> None:
+        self.kept[topic] = data
         if not self.order:
             self.taken[self.number] = None
         for kind, act in self.heard.get(topic, ()):

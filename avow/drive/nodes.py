@@ -108,7 +108,7 @@ class InvalidQoSProfileException(Exception):  # noqa: N818 - rclpy's name
 
 
 class QoSProfile:
-    """Takes what rclpy's takes. Here every message arrives."""
+    """Takes what rclpy's takes. Here every message arrives, with TRANSIENT_LOCAL also the last one from before."""
 
     def __init__(self, **named: Any) -> None:
         if "depth" not in named and named.get("history", 1) == 1 and named.keys() <= SETTINGS.keys():
@@ -287,7 +287,8 @@ class Node(Parameters):
     ) -> Any:
         self._avow_plain("Node.create_subscription", more, qos_profile)
         act = self._avow.turn(more.get("callback_group"), lambda message: self._avow.call(callback, message))
-        return Subscription(*self._avow.hear(topic, msg_type, act))
+        late = getattr(qos_profile, "durability", None) == POLICIES["durability"].TRANSIENT_LOCAL
+        return Subscription(*self._avow.hear(topic, msg_type, act, late=late))
 
     def create_publisher(
         self, msg_type: Any, topic: str, qos_profile: Any = None, *, _avow_made: Any = Publisher, **more: Any

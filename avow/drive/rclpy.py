@@ -5,7 +5,6 @@ from __future__ import annotations
 import array
 import inspect
 import math
-import re
 import sys
 from collections import UserList, UserString
 from collections.abc import Callable, Sequence, Set
@@ -16,10 +15,9 @@ from .callbacks import Driven, answers
 from .messages import INTEGERS
 from .nodes import ENTITIES, GROUPS, QOS, Duration, Future, Log, Node, Time
 from .refusals import Strict
+from .turns import SLEEPS
 
 SECOND = 10**9
-SLEEPS = re.compile(r"\bsleep|\btimeout")
-"""What in a file's text may let a callback wait."""
 LARGEST = {"float32": 3.402823466e38, "float64": 1.7976931348623157e308}
 ARRAYS = {"float32": "f", "float64": "d", "int8": "b", "uint8": "B", "int16": "h", "uint16": "H"}
 ARRAYS |= {"int32": "i", "uint32": "I", "int64": "q", "uint64": "Q"}

@@ -85,7 +85,7 @@ class Refusals:
         def refusing(name: str, real: Any) -> Any:
             def read(*given: Any, **named: Any) -> Any:
                 if not sys._getframe(1).f_code.co_filename.startswith((library, "<")):
-                    if name == "time.sleep" and self.kind == "rclpy":
+                    if name == "time.sleep":
                         return self.pause(int(given[0] * 10**9))
                     raise self.refuse(name)
                 return real(*given, **named)

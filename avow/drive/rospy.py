@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import functools
+import inspect
 import numbers
+import sys
 from collections.abc import Callable, Sequence
 from typing import Any
 
 from . import filters
-from .callbacks import RESPONSE, Driven, answers
+from .callbacks import REQUEST, RESPONSE, Driven, answers
 from .refusals import Strict, nothing
+from .turns import FREE, SLEEPS
 
 SECOND = 10**9
 LOGS = ("logdebug", "loginfo", "logwarn", "logerr", "logfatal")
@@ -30,10 +33,13 @@ def modules(spec: Any, own: Sequence[str]) -> Callable[[Any, Any], Callable[[str
     class ROSInterruptException(ROSException, KeyboardInterrupt):
         pass
 
+    class ServiceException(Exception):  # noqa: N818 - rospy's name
+        """Is never raised: every call gets a response, or waits."""
+
     every = [f"{name}{kind}" for name in LOGS for kind in ("", "_once", "_throttle", "_throttle_identical")]
     content: dict[str, Any] = dict.fromkeys(every, nothing)
     content |= {cls.__name__: cls for cls in (*_endpoints(driven), time, duration, ROSException)}
-    content["ROSInterruptException"] = ROSInterruptException
+    content |= {"ROSInterruptException": ROSInterruptException, "ServiceException": ServiceException}
     content |= {
         "get_param": _getter(find),
         "init_node": init_node,
@@ -45,6 +51,8 @@ def modules(spec: Any, own: Sequence[str]) -> Callable[[Any, Any], Callable[[str
         "resolve_name": driven.whole,
         "is_shutdown": lambda: False,
         "on_shutdown": nothing,
+        "sleep": lambda time: driven.pause(time.ns if isinstance(time, duration) else int(time * SECOND)),
+        "wait_for_service": nothing,
     }
     driven.install()
     driven.module("rospy", content)
@@ -57,6 +65,8 @@ def modules(spec: Any, own: Sequence[str]) -> Callable[[Any, Any], Callable[[str
     driven.module("message_filters", filters.CONTENT)
 
     def make(made: Any, params: Any) -> Any:
+        # each subscriber, timer and call has a thread of its own
+        driven.sleeps = driven.parallel = bool(SLEEPS.search(inspect.getsource(sys.modules[made.__module__])))
         return made(params) if _takes(made) else made()
 
     return answers(driven, make)
@@ -235,7 +245,8 @@ def _endpoints(driven: Any) -> tuple[Any, ...]:
             tcp_nodelay: bool = False,
         ) -> None:
             extra = () if callback_args is None else (callback_args,)
-            driven.hear(name, data_class, lambda message: callback(message, *extra) if callback else None)
+            act = driven.turn(object(), lambda message: callback(message, *extra) if callback else None)
+            driven.hear(name, data_class, act)
 
     class Publisher(Strict):
         _called = "rospy.Publisher"
@@ -244,6 +255,7 @@ def _endpoints(driven: Any) -> tuple[Any, ...]:
             self, name: str, data_class: Any, latch: bool = False, queue_size: Any = None, tcp_nodelay: bool = False
         ) -> None:
             self.topic, self.kind = driven.speak(name, data_class), data_class
+            driven.latched.update({self.topic: None} if latch else {})
 
         def publish(self, *given: Any, **named: Any) -> None:
             whole = len(given) == 1 and not named and type(given[0]) is self.kind
@@ -268,7 +280,27 @@ def _endpoints(driven: Any) -> tuple[Any, ...]:
                     raise TypeError("the handler of a service returned None")
                 return response(*(returned if isinstance(returned, list | tuple) else (returned,)))
 
-            self.resolved_name = driven.serve(name, service_class, act)
+            self.resolved_name = driven.serve(name, service_class, act, FREE)
+
+    class ServiceProxy(Strict):
+        _called = "rospy.ServiceProxy"
+
+        def __init__(self, name: str, service_class: Any, persistent: bool = False, headers: Any = None) -> None:
+            self._send, self.resolved_name = driven.ask(name, service_class), driven.whole(name)
+            self.request_class = driven.classes[f"{driven.services[service_class]}{REQUEST}"]
+
+        def __call__(self, *given: Any, **named: Any) -> Any:
+            whole = len(given) == 1 and not named and type(given[0]) is self.request_class
+            request = given[0] if whole else self.request_class(*given, **named)
+            return driven.wait(lambda act: self._send(request, act), "a call of a service outside of a callback")
+
+        call = __call__
+
+        def wait_for_service(self, timeout: Any = None) -> None:
+            """Every service is there."""
+
+        def close(self) -> None:
+            """No effect."""
 
     class TimerEvent:
         def __init__(self, before: Any, now: Any) -> None:
@@ -282,7 +314,8 @@ def _endpoints(driven: Any) -> tuple[Any, ...]:
         def __init__(self, period: Any, callback: Any, oneshot: bool = False, reset: bool = False) -> None:
             if type(period) is not driven.duration or period.ns <= 0:
                 raise TypeError(f"a timer's period is a Duration above 0, not {period!r}")
-            self.period, self.callback, self.oneshot, self.before, self.over = period.ns, callback, oneshot, None, False
+            self.period, self.oneshot, self.before, self.over = period.ns, oneshot, None, False
+            self.act = driven.turn(object(), callback)
             driven.later(driven.now + self.period, self.fire)
 
         def fire(self) -> None:
@@ -292,12 +325,12 @@ def _endpoints(driven: Any) -> tuple[Any, ...]:
             event, self.before = TimerEvent(self.before, now), now
             if not self.oneshot:
                 driven.later(driven.now + self.period, self.fire)
-            self.callback(event)
+            self.act(event)
 
         def shutdown(self) -> None:
             self.over = True
 
-    return Subscriber, Publisher, Timer, Service
+    return Subscriber, Publisher, Timer, Service, ServiceProxy
 
 
 def _parameters(driven: Any) -> Callable[[str], Any]:

@@ -196,8 +196,8 @@ STANDARD: dict[str, Message] = {
     )
     for base, name in _STANDARD_NAMES.items()
 }
-"""The messages that carry one built-in value, the calls of std_srvs, and that of a transition: the same in every ROS
-distribution."""
+"""The messages that carry one built-in value, and the services and actions that are the same in every ROS distribution:
+others, such as control_msgs/FollowJointTrajectory, differ."""
 
 _FIELD = re.compile(
     r"(?P<type>[A-Za-z][A-Za-z0-9_/]*)(?:<=(?P<bound>\d+))?(?P<array>\[(?P<size>(?:<=)?\d*)\])?\s+"
@@ -276,11 +276,35 @@ def parse_parts(text: str, name: str, kind: str, source: str = "") -> tuple[Mess
     return (*found, *(parse_message(answer.format(name), f"{name}_{end}", source) for end, answer in answers.items()))
 
 
+_LOOKUP = """\
+string target_frame
+string source_frame
+time source_time
+duration timeout
+time target_time
+string fixed_frame
+bool advanced
+---
+geometry_msgs/TransformStamped transform
+TF2Error error
+---
+"""
+_GRIPPED = "float64 position\nfloat64 effort\nbool stalled\nbool reached_goal"
+STANDARD |= {
+    "control_msgs/GripperCommand": parse_message(
+        "float64 position\nfloat64 max_effort", "control_msgs/GripperCommand", "control_msgs"
+    )
+}
 for _name, _text in (
+    ("example_interfaces/AddTwoInts", "int64 a\nint64 b\n---\nint64 sum"),
+    ("example_interfaces/Fibonacci", "int32 order\n---\nint32[] sequence\n---\nint32[] sequence"),
+    ("tf2_msgs/LookupTransform", _LOOKUP),
+    ("control_msgs/GripperCommand", f"GripperCommand command\n---\n{_GRIPPED}\n---\n{_GRIPPED}"),
     ("std_srvs/Empty", "---"),
     ("std_srvs/SetBool", "bool data\n---\nbool success\nstring message"),
     ("std_srvs/Trigger", "---\nbool success\nstring message"),
     ("lifecycle_msgs/ChangeState", "Transition transition\n---\nbool success"),
     ("action_msgs/CancelGoal", "GoalInfo goal_info\n---\nint8 return_code\nGoalInfo[] goals_canceling"),
 ):
-    STANDARD |= {message.name: message for message in parse_parts(_text, _name, "srv", _name.partition("/")[0])}
+    _kind = "action" if _text.count("---") == 2 else "srv"
+    STANDARD |= {message.name: message for message in parse_parts(_text, _name, _kind, _name.partition("/")[0])}

@@ -488,11 +488,166 @@ class Watch(Node):
         x = at.transform.translation.x
         self.out.publish(Bool(data=message.data + abs(x) >= 10.0))
 """
+CLIENT1 = """\
+import rospy
+from std_msgs.msg import Bool
+from std_srvs.srv import SetBool
+
+
+class Watch:
+    def __init__(self):
+        rospy.wait_for_service("gate", timeout=2.0)
+        self.gate = rospy.ServiceProxy("gate", SetBool)
+        self.go = rospy.Publisher("go", Bool, queue_size=10)
+        rospy.Subscriber("near", Bool, self.heard)
+
+    def heard(self, message):
+        try:
+            self.go.publish(self.gate(message.data).success)
+        except rospy.ServiceException:
+            self.go.publish(False)
+"""
+LATE = """\
+from rclpy.lifecycle import LifecycleNode, TransitionCallbackReturn
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from std_msgs.msg import Float64
+
+
+class Watch(LifecycleNode):
+    def __init__(self):
+        super().__init__("watch")
+        self.latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+        self.seen, self.limit, self.timer = [], 9e9, self.create_timer(0.05, self.begin)
+        self.state = self.create_publisher(Float64, "state", self.latched)
+        self.state.publish(Float64(data=1.0))
+        self.create_subscription(Float64, "state", self.seen.append, self.latched)
+        self.create_subscription(Float64, "state", self.seen.append, 10)
+
+    def begin(self):
+        self.timer.cancel()
+        assert self.seen == [Float64(data=1.0)]
+
+    def on_configure(self, state):
+        self.motor = self.create_publisher(Float64, "motor", 10)
+        self.heard = self.create_subscription(Float64, "limit", self.limited, self.latched)
+        self.speed = self.create_subscription(Float64, "speed", self.move, 10)
+        return TransitionCallbackReturn.SUCCESS
+
+    def on_cleanup(self, state):
+        self.destroy_subscription(self.heard)
+        self.destroy_subscription(self.speed)
+        return TransitionCallbackReturn.SUCCESS
+
+    def limited(self, message):
+        self.limit = message.data
+
+    def move(self, message):
+        self.motor.publish(Float64(data=min(message.data, self.limit)))
+"""
+LIMITED = """\
+context { Turn : {configure, activate, deactivate, cleanup, shutdown}; }
+node watch {
+  inputs( turn : Turn, limit : REAL, speed : REAL )
+  outputs( motor : REAL )
+  topics( lifecycle_msgs/ChangeState_Request watch/change_state matches(in.turn), float64 limit matches(in.limit),
+          float64 speed matches(in.speed), float64 motor matches(out.motor), float64 state )
+  guarantee bound ( out.motor <= in.limit )
+}
+"""
+GRIPS = """\
+node watch {
+  inputs( effort : REAL )
+  outputs( held : BOOL )
+  topics( control_msgs/GripperCommand_Goal grip matches(in.effort), control_msgs/GripperCommand_Result grip
+          matches(out.held) )
+  guarantee gentle ( out.held -> in.effort <= 5 )
+}
+"""
+GRIPPER = """\
+from control_msgs.action import GripperCommand
+from rclpy.action import ActionServer
+from rclpy.node import Node
+
+
+class Watch(Node):
+    def __init__(self):
+        super().__init__("watch")
+        self.server = ActionServer(self, GripperCommand, "grip", self.grip)
+
+    def grip(self, goal):
+        wanted = goal.request.command.max_effort
+        result = GripperCommand.Result(effort=wanted, reached_goal=wanted <= 5.0)
+        goal.succeed() if result.reached_goal else goal.abort()
+        return result
+"""
+MONITORED = """\
+node watch {
+  inputs( speed : REAL, nearest : REAL )
+  outputs( allowed : REAL )
+  topics( float64 speed matches(in.speed), sensor_msgs/LaserScan scan matches(in.nearest),
+          float64 allowed matches(out.allowed) )
+  guarantee stops ( in.nearest < 1 -> out.allowed <= 0 )
+  guarantee slows ( out.allowed <= in.speed or out.allowed == 0 )
+}
+"""
+COLLISION = """\
+import math
+
+from rclpy.node import Node
+from rclpy.qos import qos_profile_sensor_data
+from sensor_msgs.msg import LaserScan
+from std_msgs.msg import Float64
+
+
+class Watch(Node):
+    def __init__(self):
+        super().__init__("watch")
+        self.nearest = None
+        self.allowed = self.create_publisher(Float64, "allowed", 10)
+        self.create_subscription(LaserScan, "scan", self.scanned, qos_profile_sensor_data)
+        self.create_subscription(Float64, "speed", self.asked, 10)
+
+    def scanned(self, scan):
+        self.nearest = min((r for r in scan.ranges if math.isfinite(r)), default=math.inf)
+        if self.nearest < 1.0:
+            self.allowed.publish(Float64())
+
+    def asked(self, message):
+        stopped = self.nearest is None or self.nearest < 1.0
+        self.allowed.publish(Float64(data=0.0 if stopped else message.data))
+"""
+PLACED = """\
+node watch {
+  inputs( x : REAL )
+  outputs( at : REAL )
+  topics( nav_msgs/Odometry odom matches(in.x), tf2_msgs/TFMessage /tf matches(out.at) )
+  guarantee same ( out.at == in.x )
+}
+"""
+BROADCASTER = """\
+from geometry_msgs.msg import TransformStamped
+from nav_msgs.msg import Odometry
+from rclpy.node import Node
+from tf2_ros import TransformBroadcaster
+
+
+class Watch(Node):
+    def __init__(self):
+        super().__init__("watch")
+        self.broadcaster = TransformBroadcaster(self)
+        self.create_subscription(Odometry, "odom", self.heard, 10)
+
+    def heard(self, message):
+        made = TransformStamped(header=message.header, child_frame_id=message.child_frame_id)
+        made.transform.translation.x = message.pose.pose.position.x
+        made.transform.rotation = message.pose.pose.orientation
+        self.broadcaster.sendTransform(made)
+"""
 SPINS = {"mover/package.xml": PACKAGE["ws/src/mover/package.xml"]}
 SPINS |= {"mover/action/Spin.action": "int32 turns\n---\nint32 done\n---\nint32 sofar\n"}
 RANGES = "{in.left: range, in.right: range}"
 NEAR = PAIRS.replace("TimeSynchronizer(both, 5)", "ApproximateTimeSynchronizer(both, 5, 0.05)").replace("assert", "#")
-BEGINS = {"a lifecycle node": "active", "transitions": "unconfigured"}
+BEGINS = {"a lifecycle node": "active", "transitions": "unconfigured", "latched topics": "unconfigured"}
 NODES = {
     "an ament package": Made(LIMIT, PACKAGE, (("min(FASTEST", "max(FASTEST"), ("FASTEST = 1.5", "FASTEST = 1.75"))),
     "a catkin package with messages": Made(
@@ -556,6 +711,44 @@ NODES = {
     ),
     "a listener to transforms": Made(
         FENCE, {"src/fence.py": LISTENER}, (("+ abs(x)", "- abs(x)"), ("(data=True)", "(data=False)"))
+    ),
+    "a client of a service of ROS 1": Made(
+        re.sub(".*guarantee asks.*\n", "", ASKED),  # the next message may come while a call waits
+        {"src/client.py": CLIENT1},
+        (("data).success", "data).message == ''"), ("publish(self", "publish(not self")),
+        mapping="{in.free: success}",
+        kind="rospy",
+    ),
+    "latched topics": Made(
+        LIMITED,
+        {"src/late.py": LATE},
+        (
+            ("self.limited, self.latched", "self.limited, 1"),
+            ("self.limit)", "2 * self.limit)"),
+            ("append, 10", "append, self.latched"),
+        ),
+        mapping="{in.turn: transition.label}",
+        cases="1500",
+    ),
+    "an action of the distribution": Made(
+        GRIPS,
+        {"src/gripper.py": GRIPPER},
+        (("wanted <= 5.0", "wanted <= 6.0"), ("reached_goal=wanted", "reached_goal=-wanted")),
+        mapping="{in.effort: command.max_effort, out.held: reached_goal}",
+        cases="600, answers: {by: call}",
+    ),
+    "a monitor of collisions": Made(
+        MONITORED,
+        {"src/collision.py": COLLISION},
+        (("< 1.0\n        self.allowed", "< 0.5\n        self.allowed"), ("if math.isfinite(r)", "if r > 0.5")),
+        mapping="{in.nearest: {field: ranges, take: min, nan: none, inf: none, elsewhere: 100}}",
+        cases="1500",
+    ),
+    "a broadcaster of transforms": Made(
+        PLACED,
+        {"src/odometry.py": BROADCASTER},
+        (("position.x", "position.y"), ("translation.x", "translation.y")),
+        mapping="{in.x: pose.pose.position.x, out.at: 'transforms[0].transform.translation.x'}",
     ),
     "callbacks that run together": Made(
         re.sub(".*followed.*\n", "", LIMIT),
