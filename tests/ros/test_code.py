@@ -154,7 +154,14 @@ def test_what_is_computed_is_not_known(
 
 def test_a_file_that_is_no_code_is_unread(tmp_path: Path) -> None:
     assert read(tmp_path, "def").unread
+    assert read(tmp_path, "x = 1\n" * 10**6).unread
     assert read_code(tmp_path / "none.cpp").unread
+
+
+def test_a_long_file_is_read_in_no_time(tmp_path: Path) -> None:
+    blank = f"int a{' ' * 10**5}/*{'*' * 10**5}*/\n"
+    code = read(tmp_path, CXX.replace("class", f"{blank * 3}class"), "node.cpp")
+    assert {c.name for c in code.created} == {name for _, name, _, _ in CREATED}
 
 
 def every() -> list[Quality]:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from avow.base.diagnostics import Span
 from avow.base.files import read_regular
+from avow.base.tuning.sizes import LAUNCH_BYTES
 from avow.ros.code.created import Code, Created
 from avow.ros.code.cxx import from_cxx
 from avow.ros.code.python import from_python
@@ -19,6 +20,8 @@ def read_code(path: Path, class_name: str = "", beside: Collection[str] = ()) ->
     that are read too. Never raises."""
     try:
         text = read_regular(path).decode("utf-8")
+        if len(text) > LAUNCH_BYTES:
+            raise ValueError(f"it has more than {LAUNCH_BYTES} characters")
         if path.suffix == ".py":
             return from_python(text, str(path), class_name, beside)
         return from_cxx(text, str(path), beside)

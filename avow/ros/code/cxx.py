@@ -146,15 +146,14 @@ class _Reader:
         if not re.fullmatch(r"\s*[\w:]+\s*", name):
             return None
         last = re.escape(name.strip().rpartition("::")[2])
-        kind = r"(?:[\w:<>]+\s*[&*]?\s+|\])"
-        found = [*re.finditer(rf"{kind}(?:const\s+)?{last}\s*(?:\[\])?\s*(=(?!=)|[({{])", self.code)]
-        assigned = re.findall(rf"(?<![\w.>]){last}\s*=(?!=)", self.code)
-        if len(found) != 1 or len(assigned) > (found[0][1] == "="):
+        kind = r"(?<![\w:])(?!return\b)([\w:]+)(?:<[^;<>]*>)?(?:\s*+[&*]\s*+|\s++)(?:const\s++)?"
+        found = [*re.finditer(rf"{kind}{last}\s*+(?:\[\])?\s*+(=(?!=)|[({{])", self.code)]
+        assigned = re.findall(rf"(?<![\w.>]){last}\s*+=(?!=)", self.code)
+        if len(found) != 1 or len(assigned) > (found[0][2] == "="):
             return None
-        end = self.code.find(";", found[0].end())
-        value = self.code[found[0].end() - (found[0][1] != "=") : end].strip()
-        kind_said = re.search(r"[\w:]+(?=\s*[&*]?\s+(?:const\s+)?\w+\s*(?:\[\])?\s*\Z)", self.code[: found[0].start(1)])
-        return (value if found[0][1] == "=" else f"{kind_said[0] if kind_said else ''}{value}"), end
+        ((made, sign),), end = [each.groups() for each in found], self.code.find(";", found[0].end())
+        value = self.code[found[0].end() : end].strip()
+        return value if sign == "=" else f"{made}{sign}{value}", end
 
     def word(self, text: str) -> str | None:
         found = _TEXT.match(text)
