@@ -64,6 +64,8 @@ class _Reader:
     """Imported names → their whole names."""
     bound: dict[str, ast.expr] = field(default_factory=dict)
     """Names and attributes of objects (with a dot before) that are bound once, in the whole file."""
+    loops: dict[str, list[ast.expr]] = field(default_factory=dict)
+    """Names that loops bind, each to one of some values after another."""
     changed: dict[str, list[tuple[str, ast.expr, ast.stmt]]] = field(default_factory=dict)
     """Name → the assignments to attributes of its value."""
     skipped: set[int] = field(default_factory=set)
@@ -119,6 +121,11 @@ class _Reader:
                     ast.Assign(targets=[target], value=value) | ast.AnnAssign(target=target, value=ast.expr() as value)
                 ):
                     self.bind(node, target, value, counts)
+                case (
+                    ast.For(target=ast.Name(id=name), iter=ast.List(elts=items) | ast.Tuple(elts=items))
+                    | ast.comprehension(target=ast.Name(id=name), iter=ast.List(elts=items) | ast.Tuple(elts=items))
+                ) if counts[name] == 1:
+                    self.loops[name] = items
                 case _:  # binds nothing
                     pass
 
@@ -143,9 +150,9 @@ class _Reader:
             self.call(node, sure)
         elif isinstance(node, ast.Attribute) and node.attr in _METHODS:
             self.tell(node, f"{node.attr} is handed on")
-        inside = sure and not isinstance(
-            node, ast.If | ast.IfExp | ast.For | ast.While | ast.Try | ast.Match | ast.BoolOp
-        )
+        literal = isinstance(node, ast.For) and isinstance(node.iter, ast.List | ast.Tuple)
+        branches = ast.If | ast.IfExp | ast.For | ast.While | ast.Try | ast.Match | ast.BoolOp
+        inside = sure and (literal or not isinstance(node, branches))
         for child in ast.iter_child_nodes(node):
             if not (isinstance(node, ast.Call) and child is node.func and isinstance(child, ast.Attribute)):
                 self.visit(child, inside)
@@ -181,6 +188,13 @@ class _Reader:
         return found
 
     def make(self, call: ast.Call, side: str, given: Mapping[str, ast.expr], sure: bool) -> None:
+        used = (n.id for value in given.values() for n in ast.walk(value) if isinstance(n, ast.Name))
+        if (loop := next((name for name in used if name in self.loops and name not in self.bound), None)) is not None:
+            for item in self.loops[loop]:
+                self.bound[loop] = item
+                self.make(call, side, given, sure)
+            del self.bound[loop]
+            return
         if "every" in given:
             items = self.value(given["every"])
             pairs = items.elts if isinstance(items, ast.List | ast.Tuple) else [call]
