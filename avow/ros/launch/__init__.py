@@ -8,6 +8,7 @@ https://docs.ros.org/en/rolling/How-To-Guides/Launch-file-different-formats.html
 
 from __future__ import annotations
 
-from avow.ros.launch.reading import Launched, Setting, Started, read_launch
+from avow.ros.launch.reading import read_launch
+from avow.ros.launch.started import Launched, Setting, Started
 
 __all__ = ["Launched", "Setting", "Started", "read_launch"]

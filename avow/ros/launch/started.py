@@ -1,0 +1,49 @@
+"""What launch files start: nodes, their names, remappings and parameters."""
+
+from __future__ import annotations
+
+from dataclasses import field
+from pathlib import Path
+
+from avow.base.diagnostics import Diagnostic, Span
+from avow.base.records import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class Started:
+    """A node that a launch file starts. `unread`: the parts of its names that are unknown without running the file."""
+
+    name: str
+    """``/robot1/sensor``; empty if it is not known."""
+    kind: str
+    """``package/executable``, as far as it is given."""
+    remaps: tuple[tuple[str, str], ...] = ()
+    unread: tuple[str, ...] = ()
+    span: Span | None = field(default=None, compare=False, repr=False)
+    parameters: tuple[Setting, ...] = ()
+    """In their order, as far as they can be read."""
+
+
+@dataclass(frozen=True, slots=True)
+class Setting:
+    """A parameter's name and value as text; a file's path, if the name is empty. The value is empty if it is not
+    known."""
+
+    name: str
+    value: str
+    span: Span = field(compare=False, repr=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Launched:
+    """The nodes that some launch files start. `unread`: the places that cannot be read statically; `files`: all files
+    that were read."""
+
+    nodes: tuple[Started, ...] = ()
+    unread: tuple[Diagnostic, ...] = ()
+    files: tuple[Path, ...] = ()
+
+    @property
+    def is_broken(self) -> bool:
+        """Whether a file is missing or no launch file, so that nothing follows from what the others start."""
+        return any(found.is_error for found in self.unread)
