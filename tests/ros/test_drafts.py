@@ -362,8 +362,8 @@ def test_what_is_unwritten_is_counted_apart_and_behind_a_breach(tmp_path: Path) 
     )
     case = verified()
     failing = [gate["id"] for gate in case["gates"] if not gate["passed"]]
-        assert failing[0] == "refuted"
-        assert "unwritten" in failing
+    assert failing[0] == "refuted"
+    assert "unwritten" in failing
     assert [(item["kind"], item["claim"]) for item in case["open_items"] if not item["advice"]] == [
         ("refuted", "w/geiger/guarantee/low"),
         ("unwritten", "w/robot1/guarantee/to_write"),
