@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 @json_option("what came of each system; progress goes to standard error")
 @seconds_option()
 @click.option("--fresh", is_flag=True, help="Believe no earlier run: settle every obligation anew.")
-@click.option("-n", "jobs", type=click.IntRange(0), help="How many tasks at once (default: 2, or the cluster's slots).")
+@click.option("-n", "jobs", type=click.IntRange(0), help="Tasks at once (default: 2, or the cluster's slots and one).")
 @click.option("--on", "address", help="Send jobs to a cluster: dask+tls://HOST:PORT (docs/developers/scale.md).")
 @click.option(
     "--explain", is_flag=True, help="Say what each failing gate lacks, and the cheapest method that would close it."
@@ -54,7 +54,7 @@ def command(
     wanted = [f"verify:{task_name(name)}" for name in systems] or ["verify"]
     cluster, there = _cluster(address) if address else (None, None)
     if jobs is None:
-        jobs = max(2, cluster.slots) if cluster else 2
+        jobs = cluster.slots + 1 if cluster else 2  # no slot waits for this machine to prepare its next job
     try:
         return execute(place.root, wanted, jobs, sys.stdout if as_json else None, there)
     finally:
