@@ -18,7 +18,7 @@ import sys
 import threading
 import time
 from dataclasses import dataclass, field
-from importlib import metadata, util
+from importlib import util
 from typing import Any
 
 from avow.base import process
@@ -149,6 +149,8 @@ class Both:
 
 def versions() -> dict[str, str]:
     """The installed solvers, with their versions."""
+    from importlib import metadata  # a process for one question would spend a fifth of its time on it
+
     found = {"z3": metadata.version("z3-solver")}
     if util.find_spec("cvc5") is not None:
         found["cvc5"] = metadata.version("cvc5")
