@@ -3,7 +3,7 @@
     python benchmarks/table.py [ROW ...]        # default: all rows, some five minutes on an idle machine; Linux only
 
 Processor seconds of all processes that a command starts, whoever waits for them, and the peak of their memory together
-(`measured.py`). A peer that is not installed is left out: `apt install why3 z3`, then `why3 config detect`.
+(`measured.py`). A peer that is not installed is left out: `apt install why3 z3`.
 """
 
 from __future__ import annotations
@@ -11,13 +11,13 @@ from __future__ import annotations
 import shutil
 import sys
 import tempfile
-import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
 sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
 
+from graph import graph  # noqa: E402
 from measured import Cost, cost  # noqa: E402
 from scale.made import chain, fan, node, programs  # noqa: E402
 
@@ -67,7 +67,9 @@ def why3(folder: Path, nodes: int, guarantees: int) -> Cost | None:
             f"  axiom A : x >= -1000\n{program}{goals}end\n"
         )
     (folder / "made.why").write_text("".join(theories))
-    return cost(["why3", "prove", "-P", "z3", folder / "made.why"], folder)
+    own = ["why3", "-C", folder / "why3.conf"]
+    cost([*own, "config", "detect"], folder)
+    return cost([*own, "prove", "-P", "z3", folder / "made.why"], folder)
 
 
 def verification(folder: Path, nodes: int = 50) -> None:
@@ -142,6 +144,18 @@ def reading(folder: Path) -> None:
     line(f"check {path.stat().st_size / 1e6:.1f} MB of contracts", avow(folder, "check", path), "aim: 3 s for 1 MB", {})
 
 
+def robot(folder: Path) -> None:
+    """A first run of 200 nodes in ten namespaces and subsystems, with a launch file; and an edit of one clause."""
+    place = graph(folder / "contracts" / "made")
+    shutil.copy(ROOT / "dodo.py", folder)
+    first = avow(folder, "verify", "-n", "2")
+    scripts = sorted((folder / "artifacts" / "made").rglob("*.smt2"))
+    line("verify 200 nodes with 800 guarantees", first, "", {f"Z3 alone, {len(scripts)} scripts": raw_z3(scripts)})
+    contract = place / "system.rcl"
+    contract.write_text(contract.read_text().replace("-1000 <=", "-999 <=", 1))
+    line("an edit of one clause among 200 nodes", avow(folder, "verify", "-n", "2"), "", {})
+
+
 def elsewhere(name: str) -> Callable[[Path], None]:
     """A program of this folder that prints its own rows."""
 
@@ -149,30 +163,6 @@ def elsewhere(name: str) -> Callable[[Path], None]:
         print(cost([sys.executable, ROOT / "benchmarks" / name], ROOT, HERE).output, end="", flush=True)
 
     return run
-
-
-def cluster(folder: Path) -> None:
-    """A first run of 500 obligations with one worker of one slot, and with two."""
-    from scale.machines import Machines  # needs `avow[cluster]`
-
-    for workers in (1, 2):
-        machines = Machines()
-        try:
-            for _ in range(workers):
-                machines.worker()
-            with machines.cluster(workers):
-                place = workspace(folder / str(workers), 50, 10)
-            start = time.monotonic()
-            own = avow(place, "verify", "--on", machines.url)
-            clock = time.monotonic() - start
-            print(
-                f"500 obligations on Dask, workers: {workers}          {clock:7.2f} s on the clock, {own} here",
-                flush=True,
-            )
-        finally:
-            for process in reversed(machines.processes):
-                process.kill()
-                process.wait()
 
 
 ROWS: dict[str, Callable[[Path], None]] = {
@@ -183,7 +173,8 @@ ROWS: dict[str, Callable[[Path], None]] = {
     "read": reading,
     "monitor": elsewhere("monitor.py"),
     "agents": elsewhere("agents.py"),
-    "cluster": cluster,
+    "cluster": elsewhere("cluster.py"),
+    "graph": robot,
 }
 
 
