@@ -87,6 +87,12 @@ def listed(items: Sequence[str], most: int = 8) -> str:
     return ", ".join(items[:most]) + more
 
 
+def circle(names: Sequence[str], most: int = 12) -> str:
+    """Names around a circle, at most so many: ``a → b → a``."""
+    more = (f"… {len(names) - most} more …",) if len(names) > most else ()
+    return " → ".join((*names[:most], *more, names[0]))
+
+
 def exact(text: str) -> Fraction:
     """A number of a table or a plan (``2.5``, ``1/3``, ``1e-3``), exactly. Raises ValueError for any other text, and
     for a number that has more digits, written out, than one in a contract may have."""

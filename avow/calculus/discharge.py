@@ -14,6 +14,7 @@ from dataclasses import replace
 
 from avow.base.files import sha256
 from avow.base.graphs import components, cycle_in
+from avow.base.plain import circle
 from avow.base.records import dataclass
 from avow.base.tuning.effort import NARROW_EFFORT
 from avow.base.verdict import Verdict
@@ -118,10 +119,12 @@ def would_hold(frame: Frame, goal: Goal, settled: Settled) -> tuple[tuple[Phase,
     Empty if values flow in a cycle through the consumer within one step: a proof there might be circular.
     """
     condition = settled.condition
+    if settled.circle:
+        return ()
     solver = _Solver(frame, frozenset(goal.nodes), Bounds(), frozenset(goal.root.assumed))
     consumer = condition.consumer
     same, before = premises = solver.wider(condition, solver.nearest(condition, solver.selected))[-1]
-    if settled.circle or any(consumer in frame.graph.ancestors(name, solver.selected) for name in same):
+    if any(consumer in frame.graph.ancestors(name, solver.selected) for name in same):
         return ()
     found: list[tuple[Phase, tuple[Offer, ...]]] = []
     for case in settled.cases:
@@ -152,13 +155,14 @@ class _Solver:
     """Assumptions that the conclusion leaves assumed: a node's own ones may be used to prove its other ones."""
 
     def condition(self, condition: SideCondition, allowed: frozenset[str] | None = None) -> Settled:
-        """Check one side condition; `allowed`: the nodes whose contracts may be used at the same step.
+        """Check one side condition; `allowed`: the nodes whose contracts may be used at the same step, if only a proof
+        matters.
 
         Hypotheses closest to the goal are tried first: they give the proof that a reader expects, and a small query. A
         provider of a thousand consumers has a thousand guarantees, of which each consumer needs a few; and all nodes of
         a chain are ancestors of its last one. Only the widest query refutes.
         """
-        allowed = self.selected if allowed is None else allowed
+        whether, allowed = allowed is not None, self.selected if allowed is None else allowed
         nearest = self.nearest(condition, allowed)
         answer = self.asked(condition, nearest, NARROW_EFFORT, closest_only=True, whether=True)
         if answer.verdict is Verdict.PROVED:
@@ -166,7 +170,8 @@ class _Solver:
         wider = self.wider(condition, nearest, allowed)
         for premises in wider:
             last = premises is wider[-1]
-            answer = self.asked(condition, premises, self.bounds.effort if last else NARROW_EFFORT, whether=not last)
+            effort = self.bounds.effort if last else NARROW_EFFORT
+            answer = self.asked(condition, premises, effort, whether=whether or not last)
             if answer.verdict is Verdict.PROVED:
                 return answer
         return self.by_itself(condition, wider[-1]) or self.deeper(condition, answer, wider[-1])
@@ -363,7 +368,7 @@ def _loop(frame: Frame, goal: Goal, part: Derivation, settled: Mapping[SideCondi
     cycle = cycle_in(part.nodes, arcs)
     circles = [answer.circle for answer in answers if answer.circle]
     if circles:
-        shown = " → ".join((*circles[0], circles[0][0]))
+        shown = circle(circles[0])
         return Loop(part.nodes, LoopForm.CIRCULAR, circles[0], f"each assumption is proved from the next: {shown}")
     if all(answer.verdict is Verdict.PROVED for answer in answers):
         if not any(answer.used_before for answer in answers) and all(len(answer.cases) == 1 for answer in answers):

@@ -15,6 +15,7 @@ from avow.base.diagnostics import Span
 from avow.base.files import sha256
 from avow.base.optional import complete
 from avow.base.records import dataclass
+from avow.base.remembered import by_identity
 from avow.base.verdict import Hypothesis, HypothesisKind, Outcome, Verdict
 from avow.calculus import questions
 from avow.calculus.certificates import Certificates, existence_scope, requirement_scope
@@ -71,7 +72,7 @@ def all_tasks(composition: Composition) -> tuple[Task, ...]:
 
 def settle_each(composition: Composition, obligations: Sequence[Obligation], bounds: Bounds) -> Iterator[Outcome]:
     """One outcome for each obligation, in order, each as soon as it is known. The derivations cache the answers."""
-    made = tuple(_tasks(composition))
+    made = _tasks(composition)
     resting = _resting(composition, made)
     tasks = {task.obligation.id: task for task in (*made, *_requirements(composition))}
     composition.claims = _claimed(made, frozenset(obligation.id for obligation in obligations))
@@ -130,12 +131,11 @@ def _all_told(obligation: str, asked: Sequence[Established | None], scope: str) 
 # -- generation --------------------------------------------------------------------------------------------------------
 
 
-def _tasks(composition: Composition) -> Iterator[Task]:
-    for goal in composition.goals:
-        yield from _goal_tasks(composition, goal)
-    yield from _environment_tasks(composition)
-    yield from _start_tasks(composition)
-    yield from _joint_tasks(composition)
+@by_identity(8)
+def _tasks(composition: Composition) -> tuple[Task, ...]:
+    of_goals = (task for goal in composition.goals for task in _goal_tasks(composition, goal))
+    rest = (*_environment_tasks(composition), *_start_tasks(composition), *_joint_tasks(composition))
+    return (*of_goals, *rest)
 
 
 def _goal_tasks(composition: Composition, goal: Goal) -> Iterator[Task]:
@@ -373,6 +373,9 @@ class _Resting:
     def constants(self, established: Established, required: str) -> Iterator[Hypothesis]:
         """Hypotheses that inputs mentioned in a proof's clauses do not change, if the plan declares them constant."""
         frame, known = self.composition.frame, self.composition.certificates.known
+        declared = [entry for entry in frame.system.plan.environment if entry.constant]
+        if not declared:  # the marks of all claims together grow with the square of the nodes
+            return
         about = frame.required.get(required)
         spoken = [] if about is None else [v.name.rsplit(".", 1) for v in ports_of(about) if "." in v.name]
         marks = {digest for _, digest in established.shown} | {need.digest for need in established.hypotheses}
@@ -381,9 +384,7 @@ class _Resting:
                 formula = frame.system.contract.node(claim.node).clause(claim.name).formula
                 spoken += [[claim.node, v.name] for v in ports_of(formula) if v.role is Role.INPUT]
         read = {frame.entry(node, port) for node, port in spoken if node in frame.graph.nodes}
-        for entry in frame.system.plan.environment:
-            if entry.constant and entry.port in read:
-                yield self.composed(f"environment.{entry.constancy}")
+        yield from (self.composed(f"environment.{entry.constancy}") for entry in declared if entry.port in read)
 
     def everything(self) -> Iterator[Hypothesis]:
         """Every guarantee, what discharges every assumption, and hypotheses that their values belong to one step."""

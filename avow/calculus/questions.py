@@ -8,7 +8,7 @@ from typing import Protocol, assert_never
 
 from avow.base.files import sha256
 from avow.base.optional import complete
-from avow.base.plain import listed
+from avow.base.plain import circle, listed
 from avow.base.records import dataclass
 from avow.base.tuning.effort import DEFEAT_EFFORT
 from avow.base.verdict import Counterexample, Hypothesis, Link, Outcome, Verdict
@@ -143,7 +143,7 @@ def _side_answer(frame: Frame, settled: Settled, repairs: Sequence[tuple[Phase, 
         details["invariants"] = by
     bad = next((case for case in settled.cases if case.verdict is not Verdict.PROVED), None)
     if settled.circle:
-        shown = " → ".join((*settled.circle, settled.circle[0]))
+        shown = circle(settled.circle)
         summary = f"circular: proved only from contracts whose own assumptions rest on it ({shown})"
         hint = "delay an edge of the cycle and give it an initial value"
         details["circle"] = list(settled.circle)
@@ -288,7 +288,7 @@ class StartQuestion:
         graph = composition.frame.graph
         stuck = [cycle for cycle in graph.deadlocks if set(cycle) <= set(self.members)]
         if stuck:
-            shown = "; ".join(" → ".join((*cycle, cycle[0])) for cycle in stuck)
+            shown = "; ".join(circle(cycle) for cycle in stuck)
             summary = f"start-up deadlock: {shown}: each waits for the one before it"
             return Answer(
                 Verdict.REFUTED,

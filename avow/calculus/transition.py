@@ -13,6 +13,7 @@ from itertools import product
 from random import Random
 
 from avow.base.graphs import components, cycles_in
+from avow.base.plain import circle
 from avow.base.records import dataclass
 from avow.base.tuning.bounds import NODE_ANSWERS
 from avow.base.tuning.effort import SEARCH_STEPS
@@ -149,7 +150,7 @@ class Machine:
         for group in groups:
             cycles = cycles_in(group, arcs)
             if cycles:
-                shown = " → ".join((*cycles[0], cycles[0][0]))
+                shown = circle(cycles[0])
                 raise CannotRun(f"start-up deadlock: {shown} wait for one another within one step")
         return tuple(name for group in groups for name in group)
 

@@ -206,9 +206,9 @@ class Kernel:
     def begins(self, uses: Sequence[Use], marks: Sequence[str]) -> Iterator[Answered]:
         """`Begins`: initials do not constrain the environment: for all constants that the environment entries used
         allow, each output has a first value that satisfies all its conditions together (`Apart`). Raises Refused."""
-        initials = [each for each in self.known.every if each.kind is Claimed.INITIAL]
         given = [use for use in uses if self.certificate.entries[use.entry].how is How.ENVIRONMENT]
         for mark in dict.fromkeys(marks):
+            initials = [each for each in self.known.every if each.kind is Claimed.INITIAL]
             found = [self._initial(mark)]
             while more := [s for s in initials if s not in found and any(s.sources & f.sources for f in found)]:
                 found += map(self._initial, (each.digest for each in more))

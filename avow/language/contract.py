@@ -184,10 +184,8 @@ class Contract:
 
     def node(self, name: str) -> Node:
         """The node of that name. Raises KeyError."""
-        for node in self.nodes:
-            if node.name == name:
-                return node
-        raise KeyError(name)
+        found: Node = _named(self.nodes, ())[name]
+        return found
 
 
 @by_identity(20_000)

@@ -12,6 +12,7 @@ from dataclasses import replace
 
 from avow.base.diagnostics import Diagnostic, Severity
 from avow.base.graphs import components
+from avow.base.plain import circle
 from avow.base.records import dataclass
 from avow.base.remembered import by_identity
 from avow.language.contract import Node, Port
@@ -246,7 +247,7 @@ def restricted(graph: Graph, names: Iterable[str]) -> Graph:
 
 
 def _waiting(cycle: tuple[str, ...], graph: Graph) -> Diagnostic:
-    shown = " → ".join((*cycle, cycle[0]))
+    shown = circle(cycle)
     span = next((edge.span for edge in graph.edges if edge.target.node == cycle[0] and edge.span), None)
     message = f"taken as single nodes, {shown} wait for one another at one step, and nothing comes first"
     return Diagnostic("PLAN123", message, span, Severity.WARNING, "group them otherwise, or delay an edge between them")

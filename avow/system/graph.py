@@ -14,6 +14,7 @@ from dataclasses import field, replace
 
 from avow.base.diagnostics import Diagnostic, Severity, Span
 from avow.base.graphs import components, cycles_in, reached
+from avow.base.plain import circle
 from avow.base.records import dataclass
 from avow.base.remembered import by_identity
 from avow.base.suggestions import nearest
@@ -325,6 +326,6 @@ def to_delay(cycle: tuple[str, ...], edges: Sequence[Edge]) -> str:
 
 
 def _deadlock(cycle: tuple[str, ...], edges: Sequence[Edge], spans: Mapping[str, Span | None]) -> Diagnostic:
-    shown = " → ".join((*cycle, cycle[0]))
+    shown = circle(cycle)
     message = f"start-up deadlock: {shown} wait for one another and nothing comes first"
     return Diagnostic("PLAN123", message, spans.get(cycle[0]), Severity.WARNING, to_delay(cycle, edges))

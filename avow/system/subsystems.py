@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from avow.base.diagnostics import Diagnostic, Span
 from avow.base.graphs import components, cycle_in
+from avow.base.plain import circle
 from avow.base.suggestions import suggest
 from avow.language.contract import Contract
 from avow.system.folding import leaves, parents
@@ -70,7 +71,7 @@ def _circles(groups: dict[str, Subsystem]) -> Iterator[Diagnostic]:
     for component in components(groups, arcs):
         cycle = cycle_in(component, arcs)
         if cycle:
-            shown = " → ".join((*cycle, cycle[0]))
+            shown = circle(cycle)
             yield Diagnostic("PLAN110", f"subsystems contain one another: {shown}", groups[cycle[0]].span)
 
 

@@ -92,6 +92,17 @@ def test_a_circular_assumption_is_refused_with_its_cycle(tmp_path: Path) -> None
     assert "{from: b.y, to: a.y, delayed: true, initial: …}" in str(found["start.a-b"].details["next"])
 
 
+def test_a_long_circle_is_named_in_part_and_recorded_whole(tmp_path: Path) -> None:
+    ring = [
+        node(f"n{k}", f"x{k} : INTEGER", f"x{(k + 1) % 14} : INTEGER", f"A: in.x{k} > 0", f"G: out.x{(k + 1) % 14} > 0")
+        for k in range(14)
+    ]
+    found = outcomes(make(tmp_path, "".join(ring)))["whole.n0.A1"]
+    assert found.verdict is Verdict.REFUTED
+    assert "… 2 more … → n" in found.summary
+    assert len(found.details["circle"]) == 14  # type: ignore[arg-type]
+
+
 def test_a_delay_with_a_good_first_value_makes_it_well_founded(tmp_path: Path) -> None:
     plan = "connections: [{from: b.y, to: a.y, delayed: true, initial: %s}]"
     _, answers = settled(make(tmp_path / "good", CIRCLE, plan % 1))
