@@ -135,9 +135,9 @@ class RosMonitoringBackend(Backend):
 
         rml = folder / f"{identifier('', job.node.name)}.rml"
         traces = [path for path in map(partial(inside, job.root), _traces(job)) if path and path.suffix == ".jsonl"]
-        refused = json.loads(read_text(rml.with_name(f"{rml.stem}_monitor.json")))["not_in_rml"]
+        refused = {} if not names else json.loads(read_text(rml.with_name(f"{rml.stem}_monitor.json")))["not_in_rml"]
         said = tuple(name for name in job.method.guarantees if name not in refused)
-        for trace in traces if said else ():
+        for trace in traces if said and names else ():
             compiled = rml.with_suffix(".pl")
             compiler = ("java -jar rml-compiler.jar --input", rml, "--output", compiled)
             words = (*compiler, "&& monitor.sh", compiled, trace, "--silent")
