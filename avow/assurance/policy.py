@@ -319,7 +319,7 @@ def _unknown(
         Diagnostic(
             "POLICY003",
             f"{'.'.join(map(str, ('policy', *path)))}: unknown key '{key}'; known: {', '.join(known)}",
-            located.at(*path, key),
+            located.key(*path, key),
             hint=suggest(str(key), known),
         )
         for key in data

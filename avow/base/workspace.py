@@ -133,8 +133,14 @@ def system_folder(name: str) -> Path:
     if folder is not None:
         return folder
     found = find_workspace(Path.cwd().resolve())
-    hint = suggest(Path(name).name, [p.name for p in found.systems()] if found else ())
+    hint = suggest(*_typed(name, [p.name for p in found.systems()] if found else []))
     raise Rejected(Diagnostic("CLI002", f"there is no system '{name}'", hint=hint or "give its folder"))
+
+
+def _typed(name: str, known: Iterable[str]) -> tuple[str, list[str]]:
+    """What was typed, and the known systems as they would be typed in its place: by name, or by folder."""
+    above, _, last = name.rstrip("/").rpartition("/")
+    return (name.rstrip("/"), [f"{above}/{each}" for each in known]) if above else (last, list(known))
 
 
 def report_folder(given: Path) -> Path:
@@ -157,7 +163,7 @@ def require_systems(place: Workspace, names: Iterable[str]) -> tuple[str, ...]:
     found = tuple(name_of(place, name) for name in names)
     for name in found:
         if name not in known:
-            raise Rejected(Diagnostic("CLI002", f"there is no system '{name}'", hint=suggest(Path(name).name, known)))
+            raise Rejected(Diagnostic("CLI002", f"there is no system '{name}'", hint=suggest(*_typed(name, known))))
     return found
 
 

@@ -96,7 +96,7 @@ def _groups(paths: tuple[Path, ...], found: list[Diagnostic]) -> list[tuple[list
     for path in dict.fromkeys(paths):
         if path.is_dir():
             groups.append(_system(path, found))
-        elif path.suffix != ".rcl" and len(path.parts) == 1 and not path.exists():
+        elif path.suffix != ".rcl" and not path.exists():
             found.extend(_no_system(path))
         else:
             by_folder.setdefault(path.parent, []).append(path)
@@ -144,13 +144,14 @@ def _shelf(folder: Path) -> Shelf:
 def _of_plan(folder: Path, shelf: Shelf) -> Iterator[Diagnostic]:
     """The diagnostics of the folder's plan, without those of its contract files (which are checked already)."""
     from avow.pipeline.plan_check import of_plan, of_rest
+    from avow.system.faults import in_order
     from avow.system.load import load_system
 
     try:
         found = of_plan(load_system(folder, shelf), shelf=shelf)
     except Rejected as rejected:
         # errors in contract files are already reported; formulas of the plan have errors with the same codes
-        every = (*rejected.diagnostics, *of_rest(folder))
+        every = in_order((*rejected.diagnostics, *of_rest(folder)))
         found = tuple(d for d in every if not (d.code.startswith("RCL") and d.span and d.span.file.endswith(".rcl")))
     yield from (_as_told(d, folder) for d in found)
 

@@ -148,7 +148,7 @@ def _method(
     except Rejected as rejected:
         for d in rejected.diagnostics:
             severity = Severity.WARNING if d.code == "BACKEND005" else d.severity
-            yield replace(d, severity=severity, span=method.options.span)
+            yield replace(d, severity=severity, span=method.options.key())
         return
     whole = f"nodes.{node}: {method.id}"
     with asking(tool.name, "options_schema"):

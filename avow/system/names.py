@@ -15,9 +15,10 @@ from avow.language.load import parse_term
 from avow.language.printer import show_type
 from avow.system.hazards import check_mitigations
 from avow.system.node_plan import check_memory
-from avow.system.plan import STEP_LENGTH, Plan
+from avow.system.plan import STEP_LENGTH, Plan, Table
 from avow.system.statements import GENERAL
 from avow.system.strict_yaml import Piece
+from avow.system.tables import cell_place
 
 
 def check_names(plan: Plan, root: Piece, contract: Contract) -> tuple[Diagnostic, ...]:
@@ -169,7 +170,7 @@ def _scenario(plan: Plan, root: Piece, contract: Contract, nodes: dict[str, Node
         given = plan.scenario.table(table)
         for column, cells in zip(columns, (*sort.parameters, sort.result), strict=False):
             yield from _unusable(
-                f"scenario.interpret.{name}: {table}.{column}", given.column(column), cells, contract, span
+                f"scenario.interpret.{name}: {table}.{column}", given.column(column), cells, contract, span, (given,)
             )
     domains = root.at("scenario", "domains")
     types = dict(contract.types)
@@ -185,7 +186,9 @@ def _scenario(plan: Plan, root: Piece, contract: Contract, nodes: dict[str, Node
         named = s.BUILTINS.get(name) or types.get(name)
         sorts = [named] if named else [_domain_sort(port.sort) for _, port in ports_named(name, contract.nodes)]
         if len(set(sorts)) == 1 and not isinstance(sorts[0], s.FunctionSort):
-            yield from _unusable(f"scenario.domains.{name}", texts, sorts[0], contract, place)
+            said = " ".join(domains.texts(name)) if domains else ""
+            used = [table for table in plan.scenario.tables if f"{table.name}." in said]
+            yield from _unusable(f"scenario.domains.{name}", texts, sorts[0], contract, place, used)
 
 
 def _findings(root: Piece, nodes: dict[str, Node]) -> Iterator[Diagnostic]:
@@ -202,12 +205,22 @@ def _findings(root: Piece, nodes: dict[str, Node]) -> Iterator[Diagnostic]:
 # -- are a scenario's values values? What a domain or a table gives must be of the type that it is given for -----------
 
 
-def _unusable(where: str, texts: tuple[str, ...], sort: s.Sort, contract: Contract, span: Span) -> Iterator[Diagnostic]:
-    """The first of the values that is not of the sort."""
+def _unusable(
+    where: str,
+    texts: tuple[str, ...],
+    sort: s.Sort,
+    contract: Contract,
+    span: Span,
+    tables: Iterable[Table] = (),
+) -> Iterator[Diagnostic]:
+    """The first of the values that is not of the sort: in the file of the table that has it, if one does."""
     for text in list(dict.fromkeys(texts))[:VALUES_LOOKED_AT]:
         reason = _wrong(text, sort, contract)
         if reason is not None:
-            yield Diagnostic("PLAN109", f"{where}: {text!r} is no value of {show_type(sort)}: {reason}", span)
+            message = f"{where}: {text!r} is no value of {show_type(sort)}: {reason}"
+            at = next((place for table in tables if (place := cell_place(table, text))), None)
+            notes = (("the plan names it here", span),) if at else ()
+            yield Diagnostic("PLAN109", message, at or span, notes=notes)
             return
 
 

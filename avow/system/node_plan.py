@@ -67,7 +67,9 @@ def _method(node: str, item: Piece, mapping: Piece | None, used: set[str], fault
         name = f"{backend}-{number}"
         number += 1
     used.add(name)
-    return Method(name, backend, options.located(), options.texts("guarantees"))
+    located = options.located()
+    located = replace(located, keys={**located.keys, (): item.key_span(backend)})
+    return Method(name, backend, located, options.texts("guarantees"))
 
 
 # -- source ------------------------------------------------------------------------------------------------------------

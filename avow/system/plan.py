@@ -34,6 +34,12 @@ class Located:
     data: Any
     span: Span
     spans: Mapping[tuple[str | int, ...], Span] = field(default_factory=dict, compare=False, repr=False)
+    keys: Mapping[tuple[str | int, ...], Span] = field(default_factory=dict, compare=False, repr=False)
+    """The same for the position of its key."""
+
+    def key(self, *path: str | int) -> Span:
+        """The place of a part's key; of its value, if it has none."""
+        return self.keys.get(path) or self.at(*path)
 
     def at(self, *path: str | int) -> Span:
         """The place of a part, or of the nearest enclosing part that has one."""

@@ -109,6 +109,8 @@ class _PlanReader:
         self.path = path
         self.root = root
         self.faults: list[Diagnostic] = []
+        self.unread: list[str] = []
+        """The scenario's tables that have a fault."""
 
     def fault(self, code: str, message: str, span: Span, hint: str | None = None) -> None:
         self.faults.append(Diagnostic(code, message, span, hint=hint))
@@ -243,7 +245,7 @@ class _PlanReader:
                     bool(delayed and delayed.value),
                     _value(initial) if initial is not None else None,
                     span=target.span,
-                    initial_span=initial.span if initial is not None else None,
+                    initial_span=initial.inner if initial is not None else None,
                 )
 
     def environment(self) -> Iterator[EnvironmentInput]:
@@ -259,7 +261,7 @@ class _PlanReader:
                 piece.span,
                 constant is not None and constant.value is not False,
                 piece.said(*(("because",) if assume is None else ("constant", "because"))) or "",
-                assume.span if assume else None,
+                assume.inner if assume else None,
             )
 
     def scenario(self) -> Scenario | None:
@@ -271,6 +273,8 @@ class _PlanReader:
                 table = self.table(name, piece)
                 if table is not None:
                     tables[name] = table
+                else:
+                    self.unread.append(name)
         interpret = self.given("interpret", lambda piece: interpretation(piece.text, tables))
         domains = self.given("domains", lambda piece: domain(piece, tables))
         steps = self.root.at("scenario", "steps")
@@ -293,6 +297,9 @@ class _PlanReader:
         """What the scenario gives to each name under a key."""
         found: dict[str, T] = {}
         for name, _, piece in self.root.keyed("scenario", key):
+            used = " ".join(item.text for item in piece.items or [piece])
+            if any(re.search(rf"\b{re.escape(table)}[.(]", used) for table in self.unread):
+                continue  # the table's own fault is reported
             try:
                 found[name] = read(piece)
             except ValueError as wrong:
@@ -320,7 +327,7 @@ class _PlanReader:
                 piece.said("temporal"),
                 piece.texts("supported_by"),
                 piece.span,
-                (formula or temporal or piece).span,
+                (formula or temporal or piece).inner,
                 self.validation(piece.at("validation")),
                 source=piece.said("source") or "",
             )

@@ -101,7 +101,7 @@ def _departures(piece: Piece, schema: Mapping[str, Any], whole: str) -> tuple[Di
 
 
 def _piece(options: Located, path: tuple[str | int, ...]) -> Piece:
-    """The options as the reader of YAML saw them; the place of a key is that of its value."""
+    """The options as the reader of YAML saw them."""
     data = options.data
     for step in path:
         data = data[step]
@@ -109,7 +109,7 @@ def _piece(options: Located, path: tuple[str | int, ...]) -> Piece:
     match data:
         case dict():
             entries = {str(key): _piece(options, (*path, key)) for key in data}
-            return Piece(span, entries=entries, keys={key: piece.span for key, piece in entries.items()})
+            return Piece(span, entries=entries, keys={key: options.key(*path, key) for key in entries})
         case list():
             return Piece(span, items=[_piece(options, (*path, place)) for place in range(len(data))])
         case _:  # a scalar

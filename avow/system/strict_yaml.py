@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator
-from dataclasses import field
+from dataclasses import field, replace
 from typing import Any
 
 import yaml
@@ -42,6 +42,13 @@ class Piece:
     size: int = 1
     """The number of pieces in it, itself included, aliases expanded."""
     depth: int = 0
+    quoted: bool = False
+
+    @property
+    def inner(self) -> Span:
+        """The place of a scalar's text, without quotation marks."""
+        start, end = self.span.column + self.quoted, self.span.end_column - self.quoted
+        return replace(self.span, column=start, end_column=end)
 
     @property
     def data(self) -> Any:
@@ -54,7 +61,7 @@ class Piece:
 
     def located(self) -> Located:
         """The same as plain data with a map of positions."""
-        return Located(self.data, self.span, dict(_places(self, ())))
+        return Located(self.data, self.span, dict(_places(self, ())), dict(_keys(self, ())))
 
     def at(self, *path: str | int) -> Piece | None:
         """The piece at a path, or None."""
@@ -231,7 +238,8 @@ class _Builder:
     def new(self, node: yaml.Node, depth: int) -> Piece:
         if isinstance(node, yaml.ScalarNode):
             text = self.text(node)
-            return Piece(self.span(node), scalar(text) if node.style is None else text, text)
+            value, quoted = scalar(text) if node.style is None else text, node.style in ("'", '"')
+            return Piece(self.span(node), value, text, quoted=quoted)
         if depth >= PLAN_DEPTH:
             raise self.reject(node, "PLAN101", _TOO_DEEP)
         found = Piece(self.span(node))
@@ -289,6 +297,14 @@ def _places(piece: Piece, path: tuple[str | int, ...]) -> Iterator[tuple[tuple[s
             yield from _places(child, (*path, key))
     for index, child in enumerate(piece.items or ()):
         yield from _places(child, (*path, index))
+
+
+def _keys(piece: Piece, path: tuple[str | int, ...]) -> Iterator[tuple[tuple[str | int, ...], Span]]:
+    yield from (((*path, key), piece.key_span(key)) for key in piece.entries or ())
+    for key, child in (piece.entries or {}).items():
+        yield from _keys(child, (*path, key))
+    for index, child in enumerate(piece.items or ()):
+        yield from _keys(child, (*path, index))
 
 
 def _position(text: str, offset: int) -> tuple[int, int]:

@@ -24,8 +24,8 @@ def read_csv(name: str, path: Path, span: Span) -> tuple[Table | None, tuple[Dia
     """A CSV file whose first row names the columns; every row must have as many cells."""
 
     def fault(message: str, line: int | None = None) -> tuple[None, tuple[Diagnostic, ...]]:
-        notes = ((f"in {path.name}", Span(str(path), line, 1, line, 2)),) if line else ()
-        return None, (Diagnostic("PLAN109", f"scenario.{name}: {message}", span, notes=notes),)
+        at, notes = (Span(str(path), line, 1, line + 1, 1), (("the plan names it here", span),)) if line else (span, ())
+        return None, (Diagnostic("PLAN109", f"scenario.{name}: {message}", at, notes=notes),)
 
     try:
         rows = csv_rows(read_regular(path))
@@ -44,6 +44,14 @@ def read_csv(name: str, path: Path, span: Span) -> tuple[Table | None, tuple[Dia
     if len(rows) * len(header) > TABLE_CELLS:
         return fault(f"{path.name} has more than {TABLE_CELLS} cells")
     return Table(name, header, tuple(row for _, row in others), path), ()
+
+
+def cell_place(table: Table, text: str) -> Span | None:
+    """The first line of the table's file that has a cell with this text."""
+    if table.path is None:
+        return None
+    lines = (line for line, cells in csv_rows(read_regular(table.path)) if text in cells)
+    return next((Span(str(table.path), line, 1, line + 1, 1) for line in lines), None)
 
 
 def csv_rows(data: bytes) -> list[tuple[int, tuple[str, ...]]]:

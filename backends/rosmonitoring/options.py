@@ -213,7 +213,9 @@ class _Work:
         known = {p.variable.qualified for p in (*self.node.inputs, *self.node.outputs)}
         for name in self.mapping():
             if name not in known:
-                self.fault(f"{self.node.name} has no variable {name!r}", name, hint=suggest(name, sorted(known)))
+                place = self.options.key("mapping", name) if self.options else None
+                text = f"mapping.{name}: {self.node.name} has no variable {name!r}"
+                self.faults.append(Diagnostic("MON101", text, place, hint=suggest(name, sorted(known))))
                 self.meant |= {*nearest(name, known)}
 
     def duration(self, place: str, written: Any) -> Fraction:

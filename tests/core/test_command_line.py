@@ -163,7 +163,7 @@ def test_check_says_which_systems_there_are(place: Path) -> None:
     assert "there is no system 'm'" in done.output
     assert "known: n" in done.output
     done = CliRunner().invoke(LEAVES["check"], ["contracts/N"], standalone_mode=False)
-    assert "did you mean `n`?" in done.output
+    assert "did you mean `contracts/n`?" in done.output
 
 
 def test_the_table_of_exit_codes_is_in_one_place() -> None:

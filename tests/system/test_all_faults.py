@@ -304,3 +304,32 @@ def test_a_folder_of_messages_with_a_slip_in_its_name_is_told(tmp_path: Path) ->
         (found,) = (d for d in of_plan(load_system(tmp_path)) if d.code == "DRIVE101")
         assert found.is_error
         assert "under `messages`" in str(found.hint)
+
+
+@pytest.mark.parametrize(
+    ("file", "good", "bad", "shown"),
+    [
+        ("plan.yaml", "cases: 50", "case: 50", "case"),
+        ("plan.yaml", "in.raw: degrees", "in.row: degrees", "in.row"),
+        ("plan.yaml", "- hoare:", "- hoar:", "hoar"),
+        ("plan.yaml", "policy: default", "policy: {guarantee: {}}", "guarantee"),
+        ("plan.yaml", '"thermometer.temperature', '"thermometer.temperatur', "thermometer.temperatur"),
+        ("plan.yaml", "t.raw}", "t.rw}", "t.rw"),
+        ("t.csv", "1,low", "x,low", "x,low"),
+        ("t.csv", "1,low", "1", "1"),
+    ],
+)
+def test_the_caret_is_under_what_is_wrong(file: str, good: str, bad: str, shown: str, tmp_path: Path) -> None:
+    """A key, the text within quotation marks, the line of a table; one fault, and none that follows from it."""
+    folder = place(tmp_path, [])
+    plan = folder / "plan.yaml"
+    plan.write_text(plan.read_text() + "scenario:\n  t: t.csv\n  domains: {in.raw: t.raw}\n")
+    (folder / "t.csv").write_text("raw,name\n1,low\n")
+    text = (folder / file).read_text()
+    assert good in text
+    (folder / file).write_text(text.replace(good, bad))
+    done = CliRunner().invoke(command("check"), [str(folder), "--json"], standalone_mode=False)
+    (found,) = (d for d in json.loads(done.stdout)["diagnostics"] if d["severity"] == "error")
+    line = (folder / file).read_text().splitlines()[found["line"] - 1]
+    end = found["end_column"] - 1 if found["end_line"] == found["line"] else None
+    assert line[found["column"] - 1 : end] == shown

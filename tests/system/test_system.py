@@ -237,7 +237,7 @@ def test_a_method_that_nobody_knows_has_its_place_and_the_nearest_name(tmp_path:
     assert (found.code, found.hint, found.span and found.span.column) == (
         "BACKEND002",
         "did you mean `hypothesis`?",
-        plan.index("{}") + 1,
+        plan.index("hypotesis") + 1,
     )
 
 
