@@ -15,7 +15,7 @@ from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.verdict import Link, Object, Verdict
 from avow.language.contract import Clause, Node
 
-from .campaign import NotMade, drawn, recorded, regressions
+from .campaign import NotMade, drawn, experiment, recorded, regressions
 from .options import SCHEMA, read
 from .profile import Campaign, command_files, read_campaign, regressions_of
 from .verdict import settle
@@ -53,6 +53,7 @@ class ExperimentBackend(Backend):
             if (campaign := _campaign(job)) is None:
                 read(job)
             else:
+                experiment(job, (), ())  # the options of the claim
                 regressions(campaign)
                 drawn(campaign)
         except Rejected as error:
@@ -74,19 +75,19 @@ class ExperimentBackend(Backend):
         try:
             if _campaign(job) is not None:
                 return {"claim.json": document(_claim(job)) + "\n"}
-            experiment = read(job)
+            found = read(job)
         except Rejected:
             return {}
         claim = _claim(job) | {
-            "conditions": {name: [c.name for c in claim.conditions] for name, claim in experiment.claims.items()},
-            "least success rate": str(experiment.at_least or experiment.floor),
+            "conditions": {name: [c.name for c in claim.conditions] for name, claim in found.claims.items()},
+            "least success rate": str(found.at_least or found.floor),
         }
         return {"claim.json": document(claim) + "\n"}
 
     def discharge(self, job: Job, folder: Path, limits: Limits) -> Report:
         try:
             campaign = _campaign(job)
-            experiment = read(job) if campaign is None else recorded(job, campaign)
+            found = read(job) if campaign is None else recorded(job, campaign)
         except NotMade as state:
             verdict, why = state.args
             why = f"{why}: `avow campaign {job.system.name} {job.node.name}` makes the runs"
@@ -96,9 +97,9 @@ class ExperimentBackend(Backend):
             return Report.alike(job, Verdict.ERROR, why, "avow experiment", self.version)
         outcomes, logs = [], {}
         for o in job.obligations:
-            outcome, logs[f"{o.name}.tsv"] = settle(o.name, experiment, job.kept.get(o.id, ()))
+            outcome, logs[f"{o.name}.tsv"] = settle(o.name, found, job.kept.get(o.id, ()))
             # the meaning of a part of the contract in terms of columns is a person's judgement
-            link = Link.GUIDED if experiment.claims[o.name].interpreted else self.link
+            link = Link.GUIDED if found.claims[o.name].interpreted else self.link
             of = self.of if campaign is None else Object.MODEL
             outcomes.append(replace(outcome, obligation=o.id, link=link, of=of))
         return Report(tuple(outcomes), "avow experiment", self.version, logs=logs)

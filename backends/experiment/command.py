@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from itertools import takewhile
 from typing import Any
@@ -94,6 +94,8 @@ class _Work:
     chosen: dict[str, Made] = field(default_factory=dict)
     """The failing runs of a search, by their names."""
     searched: Searched | None = None
+    excused: int = 0
+    """The runs of the search that broke an assumption."""
 
     def perform(self, run: Run) -> Made:
         row, told = perform(self.job, self.campaign, run, float(self.job.method.options.data.get("seconds", SECONDS)))
@@ -160,6 +162,7 @@ class _Work:
     def attempt(self, cells: Cells) -> Tried:
         made = self.perform(Run("search", self.campaign.seed, cells))
         if any(one.excused for one in made.verdicts.values()):
+            self.excused += 1
             return Tried({}, False)
         if _failed(made):
             name = f"s{len(self.chosen) + 1}"
@@ -171,7 +174,7 @@ class _Work:
         if any(map(_failed, self.again)):
             return False
         if self.searched is not None:
-            return self.searched.failing is None
+            return self.searched.failing is None and self.excused < self.searched.runs
         whole = "at_least" not in self.job.options or len(self.made) == self.campaign.runs
         return whole and bool(self.made) and all(map(_shown, self.outcomes().values()))
 
@@ -190,7 +193,8 @@ class _Work:
     def found(self, searched: Searched) -> str:
         node = self.job.node.name
         if searched.failing is None:
-            return f"{node}: no failing scenario in {count(searched.runs, 'run')} of a search, which count for no rate"
+            excused = f" ({self.excused} broke an assumption)" if self.excused else ""
+            return f"{node}: no failing scenario in {count(searched.runs, 'run')} of a search{excused}, for no rate"
         return f"{node}: run {searched.runs} of the search failed; simplified in {searched.shrinking} more, and kept"
 
     def summary(self) -> dict[str, Any]:
@@ -209,7 +213,8 @@ def _shown(outcome: Outcome) -> bool:
 
 
 def _failed(made: Made) -> bool:
-    return any(one.broken is not None for one in made.verdicts.values())
+    """Also if it cannot be judged."""
+    return any(one.broken is not None or (one.undecided and not one.excused) for one in made.verdicts.values())
 
 
 def _distance(made: Made) -> float:
@@ -223,7 +228,8 @@ def _word(made: Made) -> str:
     for word in ("excused", "undecided"):
         if why := next((one.undecided or one.why for one in made.verdicts.values() if getattr(one, word)), ""):
             return f"{'an assumption is broken' if word == 'excused' else word}: {why}"
-    return "held"
+    met = any(one.met or not made.conditions[name] for name, one in made.verdicts.items())
+    return "held" if met else "not triggered"
 
 
 def _line(made: Made) -> str:
@@ -244,8 +250,9 @@ def _jobs(system: System, node: str | None) -> list[tuple[Job, Campaign]]:
     found, faults = [], list[Diagnostic]()
     for plan in system.plan.nodes:
         for one in plan.methods:
-            data = one.options.data if one.backend == "experiment" else {}
-            if node not in (None, plan.node) or "campaign" not in data:
+            data = one.options.data
+            given = one.backend == "experiment" and isinstance(data, Mapping) and "campaign" in data
+            if node not in (None, plan.node) or not given:
                 continue
             wrong = misshapen(SCHEMA, one.options, f"nodes.{plan.node}: {one.backend}")
             faults += wrong

@@ -162,6 +162,9 @@ def read_campaign(job: Job, table: Path | None) -> Campaign:
         wrong(f"command: {{{place}}} is no parameter of the scenario", "command", hint=suggest(place, sorted(known)))
     for name in sorted({*given["scenario"], "trace"} - used):
         wrong(f"command: no argument has {{{name}}}, so the simulator does not get it", "command")
+    if (strata := job.options.get("strata")) not in (None, *given["scenario"]):
+        place, near = job.method.options.at("strata"), suggest(str(strata), tuple(given["scenario"]))
+        faults.append(Diagnostic("EXP101", f"strata: '{strata}' is no parameter of the scenario", place, hint=near))
     if Path(given["trace"]).name != given["trace"] or given["trace"] in ("", ".", ".."):
         wrong(f"trace: '{given['trace']}' is no name of a file", "trace")
     for name in given.get("files", ()):

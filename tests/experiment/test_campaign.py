@@ -182,11 +182,21 @@ def test_a_run_without_a_recording_fails_and_is_no_counterexample(how: str, tmp_
     assert outcome.bound["failures"] == 1
 
 
+def test_a_run_that_nobody_can_judge_ends_the_campaign_and_the_search(tmp_path: Path) -> None:
+    root = made(tmp_path)
+    edit(root / "world.py", ('("distance", distance)', '("distance", "far")'))
+    assert campaign(root, code=1).count("undecided:") >= 2  # the run, and as a regression
+    assert len((root / "data/runs.csv").read_text().splitlines()) == 2
+    assert settle(root).verdict is Verdict.UNKNOWN
+    assert "run 1 of the search failed" in campaign(root, "--search", code=1)
+
+
 def test_a_run_that_breaks_an_assumption_is_no_trial(tmp_path: Path) -> None:
     root = made(tmp_path)
     edit(root / "system.rcl", ("<= 9", "<= 0.5"))
     assert "an assumption is broken" in campaign(root, "--runs", "2", code=1)
     assert settle(root).vacuous
+    assert "3 runs of a search (3 broke an assumption)" in campaign(root, "--search", "--runs", "3", code=1)
 
 
 @pytest.mark.slow
@@ -224,6 +234,7 @@ def test_a_claimed_rate_gets_every_run_of_the_plan(tmp_path: Path) -> None:
 
 
 WRONG = [
+    ("seed: 3", "seed: 3\n          strata: flor", "'flor' is no parameter"),
     ("seed: 3", "seed: 3\n          steps: true", "'steps' does not go with 'campaign'"),
     ('"{grip}"', '"{gripp}"', "{gripp} is no parameter"),
     ('"{floor}"', "dry", "no argument has {floor}"),
