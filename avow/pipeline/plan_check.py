@@ -157,9 +157,12 @@ def _method(
     without: tuple[Span, ...] = ()
     if any(d.is_error for d in wrong):
         options, without = _right(tool.options_schema, method.options)
-        method = replace(method, options=options)
-        if any(misshapen(tool.options_schema, options, whole)):
+        if (
+            any(misshapen(tool.options_schema, options, whole))
+            or tool.campaigns in method.options.data.keys() - options.data
+        ):
             return  # without the faulty options the others mean nothing
+        method = replace(method, options=options)
     for known in (n for n in system.contract.nodes if n.name == node):
         named = {clause.name for clause in known.guarantees}  # others are reported where the plan names them
         method = replace(method, guarantees=tuple(name for name in method.guarantees if name in named))

@@ -253,6 +253,8 @@ def test_all_faults_of_the_option_are_told_at_once(tmp_path: Path) -> None:
     assert [text for *_, text in WRONG if text not in told] == []
     assert "Traceback" not in told
     assert len(BACKEND.check(job(root))) >= len(WRONG)
+    edit(made(tmp_path) / "plan.yaml", ("runs: 20", "runs: 0"))
+    assert avow("check", str(root / "plan.yaml"), cwd=root).stdout.count("error[") == 1
 
 
 def test_a_plan_without_campaign_monitors_or_program_is_told(tmp_path: Path) -> None:
