@@ -188,7 +188,8 @@ def command_files(job: Job) -> tuple[Path, ...]:
     """The files of the system's folder that the command names, and those under `files`. Never raises."""
     given = job.options.get("campaign")
     found: dict[Path, None] = {}
-    for name in (*given.get("command", ()), *given.get("files", ())) if isinstance(given, Mapping) else ():
+    lists = [given.get(key) for key in ("command", "files")] if isinstance(given, Mapping) else []
+    for name in (name for names in lists if isinstance(names, list) for name in names):
         path = inside(job.root, str(name)) if _PLACE.search(str(name)) is None else None
         found |= dict.fromkeys(_files(path)) if path is not None and path != job.root.resolve() else {}
     return tuple(found)

@@ -255,6 +255,8 @@ def test_all_faults_of_the_option_are_told_at_once(tmp_path: Path) -> None:
     assert len(BACKEND.check(job(root))) >= len(WRONG)
     edit(made(tmp_path) / "plan.yaml", ("runs: 20", "runs: 0"))
     assert avow("check", str(root / "plan.yaml"), cwd=root).stdout.count("error[") == 1
+    edit(root / "plan.yaml", ("runs: 0", "files: 3"))
+    assert root / "world.py" in BACKEND.files(job(root))
 
 
 def test_a_plan_without_campaign_monitors_or_program_is_told(tmp_path: Path) -> None:
