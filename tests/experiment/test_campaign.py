@@ -104,6 +104,7 @@ def test_drawn_runs_are_trials_up_to_the_number_needed(drawn: Path) -> None:
     assert not BACKEND.check(job(drawn))
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_table_also_in_parts(drawn: Path) -> None:
     table = (drawn / "data/runs.csv").read_text()
     shutil.rmtree(drawn / "data")
@@ -222,6 +223,7 @@ def test_a_failing_scenario_is_found_simplified_and_kept(drawn: Path) -> None:
     assert settle(drawn, refuted).verdict is Verdict.UNKNOWN, "a refutation does not vanish with its file"
 
 
+@pytest.mark.slow
 def test_a_claimed_rate_gets_every_run_of_the_plan(tmp_path: Path) -> None:
     root = made(tmp_path)
     edit(root / "plan.yaml", ("seconds: 5", "seconds: 5\n          at_least: 0.8"))
