@@ -15,14 +15,16 @@ from avow.assurance.answers import MODELS, PLATFORM, REACTION, RECORDINGS, SAMPL
 from avow.assurance.closure import Closed, used
 from avow.assurance.facts import Facts
 from avow.assurance.findings import takes
+from avow.assurance.gap import reviewers
 from avow.assurance.model import ObligationView
 from avow.assurance.naming import short
-from avow.assurance.relied import Judged, Relied, differs, looked_at, seen
+from avow.assurance.relied import Judged, Relied, differs, looked_at, relied_of, seen
 from avow.assurance.support import assumption_claim
 from avow.base.records import dataclass
 from avow.base.verdict import HypothesisKind, Object
 from avow.evidence.obligation import Kind
-from avow.evidence.status import Status
+from avow.evidence.record import Evidence
+from avow.evidence.status import Status, weigh
 from avow.formulas.temporal.cell import CELL
 from avow.system.plan import Requirement, Statement
 from avow.system.statements import GENERAL
@@ -176,20 +178,43 @@ def _of_methods(
     closed: Mapping[str, Closed],
     statements: Statements,
 ) -> Iterator[_Raw]:
-    """Hypotheses of the records that are relied upon."""
+    """Hypotheses of the records that are relied upon, and of the others that support a claim (no requirement needs
+    these)."""
     for view in views:
-        if view.id not in relied:
-            continue
-        found = relied[view.id]
-        # assumptions about how a program is run, or about its likeness to a model, are not about the sampled cases
-        sampled = found.status in (Status.TESTED, Status.MONITORED) and view.obligation.kind is not Kind.PROGRAM
-        for text in found.assumptions:
-            statement = statements.of_method(found.record.method, text)
-            if not statement.place and text in found.scenario:
-                statement = _SCENARIO
-            place = statement.place or f"assumptions.{found.record.method}: {text}"
-            sort = Sort.SAMPLING if sampled else Sort.MODELS
-            yield _Raw(sort, place, text, statement, view.id, _in(closed, view.id))
+        for found, needed in _supporting(view, relied, closed):
+            # assumptions about how a program is run, or about its likeness to a model, are not about the sampled cases
+            sampled = found.status in (Status.TESTED, Status.MONITORED) and view.obligation.kind is not Kind.PROGRAM
+            for text in found.assumptions:
+                statement = statements.of_method(found.record.method, text)
+                if not statement.place and text in found.scenario:
+                    statement = _SCENARIO
+                elif not statement.place and found.status is Status.REVIEWED:
+                    statement = _condition(found.record, text)
+                place = statement.place or f"assumptions.{found.record.method}: {text}"
+                sort = Sort.SAMPLING if sampled else Sort.MODELS
+                yield _Raw(sort, place, text, statement, view.id, needed)
+
+
+def _supporting(
+    view: ObligationView, relied: Mapping[str, Relied], closed: Mapping[str, Closed]
+) -> Iterator[tuple[Relied, Callable[[str], bool]]]:
+    """The records that support a claim, and the requirements that need their assumptions: those of the record relied
+    upon."""
+    if view.id not in relied:
+        return
+    holders = _in(closed, view.id)
+    yield relied[view.id], holders
+    for record in view.records:
+        status = weigh(record).support
+        if record is not relied[view.id].record and status is not None:
+            yield relied_of(record, status), lambda name: name == _WHOLE and holders(name)
+
+
+def _condition(record: Evidence, text: str) -> Statement:
+    """A review's condition: the reviewer vouches for the guarantee under it, as long as the review is valid."""
+    place = f"assumptions.{record.method}: {text}"
+    until, made = (str(record.details.get(key, "")) for key in ("valid_until", "date"))
+    return Statement(place, text, record.summary, ", ".join(reviewers(record)), until, made)
 
 
 def _accepted(facts: Facts, views: Sequence[ObligationView], closed: Mapping[str, Closed]) -> Iterator[_Raw]:
@@ -231,14 +256,20 @@ def _of_evidence(
     """The assumptions that no record states: that the program behaves like its model, that untried cases are like those
     tried, that the platform behaves as expected, and that the tools answer correctly."""
     programs = [view for view in views if view.obligation.kind is Kind.PROGRAM]
+    tools = statements.at(TOOLS)
+    tools = tools if tools.says else replace(tools, says=GENERAL[TOOLS])
     for view in views:
+        for found, needed in _supporting(view, relied, closed):
+            if looked_at(found) is not None:
+                tool = found.record.tool or found.record.backend
+                yield _Raw(Sort.TOOLS, TOOLS, tool, tools, view.id, needed)
         if view.id not in relied or view.obligation.kind is not Kind.GUARANTEE:
             continue
         found, name = relied[view.id], short(view.id)
         record = found.record
         if looked_at(found) is None:  # a person's statement
             continue
-        about = [(Sort.PLATFORM, PLATFORM, ""), (Sort.TOOLS, TOOLS, record.tool or record.backend)]
+        about = [(Sort.PLATFORM, PLATFORM, "")]
         if record.of is Object.MODEL and not differs(programs, view.obligation, record):
             about.append((Sort.MODELS, MODELS, f"{name} by {record.method}"))
         if found.status in (Status.TESTED, Status.MONITORED):

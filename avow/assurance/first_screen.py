@@ -319,7 +319,9 @@ def _owners(assumptions: Sequence[Assumption]) -> str:
     all_end = len(ends) == 1 and all(s.until for s in owned)
     until = f", until {ends[0]}" if all_end else f"; the first ends {ends[0]}" if ends else ""
     lasting = sum(not s.until for s in owned)
-    return f"{named}{since}{until}" + (f"; {lasting} end{'s' * (lasting == 1)} when a text changes" if lasting else "")
+    unneeded = sum(not s.needed_by for s in assumptions)
+    counts = {f"end{'s' * (lasting == 1)} when a text changes": lasting, "needed by no requirement": unneeded}
+    return f"{named}{since}{until}" + "".join(f"; {many} {what}" for what, many in counts.items() if many)
 
 
 def _changed(changes: Changes) -> tuple[tuple[str, str], ...]:

@@ -70,9 +70,8 @@ def relied_upon(view: ObligationView, opinion: Opinion, views: Iterable[Obligati
         outdone = record.of is Object.MODEL and any(
             other.of is not Object.MODEL and rank.rank >= status.rank for other, rank in supporting
         )
-        open_ones = in_words(record.rests_on, record.hypotheses)
-        limits = (h for h in record.rests_on if h.kind is HypothesisKind.BOUND and h.name.startswith("scenario."))
-        thought = [opinion(record.method, text) for text in open_ones]
+        way = relied_of(record, status)
+        thought = [opinion(record.method, text) for text in way.assumptions]
         badness = (
             any(t.expired for t in thought) or differs(views, view.obligation, record),
             status not in EXHAUSTIVE,
@@ -80,11 +79,17 @@ def relied_upon(view: ObligationView, opinion: Opinion, views: Iterable[Obligati
             not all(t.owned for t in thought),
             -status.rank,
             agrees(views, view.obligation, record.method) is None,
-            len(open_ones),
+            len(way.assumptions),
             record.method,
         )
-        ways.append((badness, Relied(record, status, open_ones, frozenset(h.text for h in limits))))
+        ways.append((badness, way))
     return min(ways, key=lambda way: way[0], default=(None, None))[1]
+
+
+def relied_of(record: Evidence, status: Status) -> Relied:
+    """A record with the status that it counts as, and its assumptions."""
+    limits = (h for h in record.rests_on if h.kind is HypothesisKind.BOUND and h.name.startswith("scenario."))
+    return Relied(record, status, in_words(record.rests_on, record.hypotheses), frozenset(h.text for h in limits))
 
 
 def shade(view: ObligationView) -> Tone:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Sequence
 
@@ -46,7 +47,7 @@ def trust_lines(
         second = several if len(kernel.solvers) > 1 else "no second solver"
         lines.append(TrustLine("solvers", names, second, twice < len(certified) or not twice))
     tools = Counter(tool for proof in proofs for tool in proof.tools)
-    tools.update(_named(r) for v in views for r in v.records if weigh(r).support in _SAMPLED)
+    tools.update(_named(r) for v in views for r in v.records if weigh(r).support in _SAMPLED or weigh(r).refuted)
     if tools:
         names = listed([f"{tool}: {count(many, 'answer')}" for tool, many in sorted(tools.items())], 9)
         lines.append(
@@ -60,4 +61,6 @@ def trust_lines(
 
 
 def _named(record: Evidence) -> str:
-    return f"search by {record.tool_told}" if record.backend == CALCULUS else record.tool_told
+    """The tool in plain characters: commas and parentheses separate the names in a list."""
+    told = " ".join(re.sub(r"[^\w.+-]", " ", record.tool_told).split())
+    return f"search by {told}" if record.backend == CALCULUS else told

@@ -105,10 +105,12 @@ class Facts:
         return sum(not grades or p["grade"] in grades for p in asked)
 
     def tools(self) -> Counter[str]:
-        """How many answers without a certificate each tool has: proofs, searches, tests and observations."""
+        """How many answers without a certificate each tool has: proofs, searches, tests, observations, refutations."""
         found = Counter(tool for p in self.case["proofs"] for tool in p.get("tools") or ())
         sampled = ("checked", "tested", "monitored")
-        found.update(_tool(r) for v in self.views for r in records(v) if support(r) in sampled)
+        found.update(
+            _tool(r) for v in self.views for r in records(v) if support(r) in sampled or r["verdict"] == "refuted"
+        )
         return found
 
     def stands(self, node: str, status: str, what: str) -> tuple[int, int]:
@@ -241,6 +243,7 @@ def _words(text: str) -> set[str]:
 def _tool(record: Json) -> str:
     tool, version = record["tool"], record["tool_version"]
     told = version if tool and version.casefold().startswith(tool.casefold()) else f"{tool} {version}".strip()
+    told = " ".join(re.sub(r"[^\w.+-]", " ", told).split())
     return f"search by {told}" if record["backend"] == "compose" else told
 
 

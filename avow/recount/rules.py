@@ -317,6 +317,7 @@ RULES = (
     _rule("q4", r"of (\d+) with an owner and an end", _whole(lambda f: len(f.assumptions))),
     _rule("q4", r"([^,:]+?) \((\d+)\)(?=[,;.]| and )", _owners),
     _rule("q4", r"(\d+) ends? when a text changes", _whole(lambda f: sum(not a["until"] for a in f.owned_ones()))),
+    _rule("q4", r"(\d+) needed by no requirement", _whole(lambda f: sum(not a["needed_by"] for a in f.assumptions))),
     _rule("q4", rf"assumed since {_DAY}(?: to {_DAY})?", _days),
     _rule("q4", rf"(?:until|the first ends) {_DAY}", _days),
     _rule("q4", r"\bA(\d+)(?= )", _says),

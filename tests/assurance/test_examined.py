@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from assurance.sample import case, evidence, guarantee, node_plan, obligation, system
-from avow.assurance.answers import MODELS, Level
+from avow.assurance.answers import MODELS, TOOLS, Level
 from avow.assurance.model import Case, Gate
 from avow.base.verdict import Object, Verdict
 from avow.evidence.obligation import Kind, ProgramClaim
@@ -65,9 +65,18 @@ def test_a_model_that_the_program_refutes_shows_nothing() -> None:
 
 
 def test_a_reviews_condition_is_a_numbered_assumption() -> None:
-    found = made(evidence(G, Verdict.REVIEWED, "review", hypotheses=("the map is loaded",)))
-    assert [a.text for a in found.assumptions] == ["the map is loaded"]
+    signed = {"reviewer": "A. Person", "date": "2026-11-20", "valid_until": "2027-01-01"}
+    read = evidence(G, Verdict.REVIEWED, "review", hypotheses=("the map is loaded",), details=signed)
+    found = made(read)
+    assert [(a.says, a.who, a.until) for a in found.assumptions] == [("the map is loaded", "A. Person", "2027-01-01")]
     assert {d.key for d in found.deficits}.isdisjoint({"open", "conditional"})
+    beside = {a.text: a.needed_by for a in made(MODEL, read).assumptions}
+    assert beside["the map is loaded"] == (), "the proof does not need it"
+
+
+def test_every_tool_that_speaks_for_a_claim_is_assumed_to_answer_rightly() -> None:
+    (tools,) = (a for a in made(MODEL, TESTED).assumptions if a.key == TOOLS)
+    assert tools.text.split("\n") == ["z3", "hypothesis"]
 
 
 def test_a_test_of_the_source_is_no_proof() -> None:
