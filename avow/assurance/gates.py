@@ -61,7 +61,7 @@ def gates(
                 (Kind.COMPOSITION, "The composition holds", facts.policy.composition),
             )
         ),
-        *_guarantees(facts, obligations, excused),
+        *_guarantees(facts, obligations, relied, excused),
         *_programs(facts, obligations, relied, excused),
         _derivations(facts, derivations, views, excused, {view.id for view in unwritten} | behind),
         _requirements(facts, requirements, derivations, views, excused, granted),
@@ -207,7 +207,9 @@ def _short_of(status: Status, good: Sequence[Status]) -> str:
     return f"{status.value}, but {_in_words(good)} is asked" if status.supports else status.value
 
 
-def _guarantees(facts: Facts, obligations: Sequence[ObligationView], excused: set[str]) -> Iterable[Gate]:
+def _guarantees(
+    facts: Facts, obligations: Sequence[ObligationView], relied: Mapping[str, Relied], excused: set[str]
+) -> Iterable[Gate]:
     for criticality, demand in facts.policy.guarantees:
         of_kind = [
             v
@@ -226,7 +228,9 @@ def _guarantees(facts: Facts, obligations: Sequence[ObligationView], excused: se
             failing,
             excused,
             lambda view, lacking=lacking: lacking[view.id] or "",  # type: ignore[misc]
-            _holding([v.status.supports for v in of_kind], asked=bool(demand.one_of)) + _kinds(of_kind, demand, facts),
+            _holding([v.status.supports for v in of_kind], asked=bool(demand.one_of))
+            + _kinds(of_kind, demand, facts)
+            + _of_models(of_kind, relied),
             demand.text() if demand.one_of else "",
             idle=not demand.one_of,
         )
@@ -240,6 +244,12 @@ def _kinds(views: Sequence[ObligationView], demand: Demand, facts: Facts) -> str
     found = [{status for r in records if (status := weigh(r).support)} for records in kept]
     kinds = Counter(" and ".join(s.value for s in Status if s in of) for of in found if of)
     return ": " + ", ".join(f"{many} {kind}" for kind, many in kinds.items())
+
+
+def _of_models(views: Sequence[ObligationView], relied: Mapping[str, Relied]) -> str:
+    """How many of them no evidence about a program or its recordings supports as well as that about a model."""
+    many = sum(v.id in relied and looked_at(relied[v.id]) is Object.MODEL for v in views)
+    return f"; {many} of a model only" if many else ""
 
 
 def _programs(

@@ -27,8 +27,8 @@ def trust_lines(
     wanted = certifiable(proofs)
     certified = [p for p in wanted if p.grade in (ProofGrade.CERTIFIED_1, ProofGrade.CERTIFIED_2)]
     twice = sum(p.grade is ProofGrade.CERTIFIED_2 for p in certified)
-    tested = "tested against an evaluator that shares no code with them; a translator is not proved"
-    lines = [TrustLine("Avow's front end", "parser, type checker and translators", tested)]
+    tested = "Avow is not qualified; tested against an evaluator that shares no code, its translators are not proved"
+    lines = [TrustLine("Avow's front end", "parser, type checker and translators", tested, True)]
     if wanted and kernel.run == run:
         lines.append(
             TrustLine(
