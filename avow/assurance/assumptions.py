@@ -117,9 +117,9 @@ def assumptions(
         *_reaction(facts, closed, statements),
         *_meaning(facts.requirements, statements),
     ]
-    merged: dict[tuple[Sort, str], list[_Raw]] = {}
+    merged: dict[str, list[_Raw]] = {}
     for item in raw:
-        merged.setdefault((item.sort, item.statement.says or item.statement.because or item.text), []).append(item)
+        merged.setdefault(item.statement.says or item.statement.because or item.text, []).append(item)
     needed = [
         _one(items, tuple(required), statements)
         for items in merged.values()

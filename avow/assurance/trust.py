@@ -62,5 +62,5 @@ def trust_lines(
 
 def _named(record: Evidence) -> str:
     """The tool in plain characters: commas and parentheses separate the names in a list."""
-    told = " ".join(re.sub(r"[^\w.+-]", " ", record.tool_told).split())
+    told = " ".join(re.sub(r"[^\w.+'-]", " ", record.tool_told).split())
     return f"search by {told}" if record.backend == CALCULUS else told

@@ -243,7 +243,7 @@ def _words(text: str) -> set[str]:
 def _tool(record: Json) -> str:
     tool, version = record["tool"], record["tool_version"]
     told = version if tool and version.casefold().startswith(tool.casefold()) else f"{tool} {version}".strip()
-    told = " ".join(re.sub(r"[^\w.+-]", " ", told).split())
+    told = " ".join(re.sub(r"[^\w.+'-]", " ", told).split())
     return f"search by {told}" if record["backend"] == "compose" else told
 
 

@@ -260,6 +260,13 @@ def test_a_reason_that_says_no_more_than_its_assumption_is_none() -> None:
     assert told == (PLATFORM,)
 
 
+def test_an_assumption_of_a_proof_and_of_a_test_stands_once() -> None:
+    listed = [evidence(g, hypotheses=("the map is true",)) for g in GUARANTEES]
+    listed += [evidence(g, Verdict.TESTED, "hoare-2", hypotheses=("the map is true",)) for g in GUARANTEES]
+    words = [Statement(f"assumptions.{m}.map", "The map is true", "", *OWNED) for m in ("hoare", "hoare-2")]
+    assert [s.words for s in build(listed, words, formal=True).assumptions].count("The map is true") == 1
+
+
 def test_an_assumption_stands_once_whoever_needs_it() -> None:
     said = [
         Statement("environment.in.a", "The map is right", "surveyed", "x", "2030-01-01", "2026-11-20"),
