@@ -33,10 +33,13 @@ def suggest(name: str, known: Iterable[str]) -> str | None:
     return _hint(nearest(name, names)) or f"known: {shown}"
 
 
-def nearby(path: Path) -> str | None:
-    """A hint for a path that does not exist: what is beside it, if a name is near. Never raises."""
+def nearby(path: Path, written: str = "") -> str | None:
+    """A hint for a path that does not exist: what is beside it, if a name is near, as it would be `written` in place of
+    the path. Never raises."""
+    above = written.rpartition("/")[0] if written else "" if path.is_absolute() else str(path.parent)
     beside = [each.name for each in path.parent.iterdir()] if path.parent.is_dir() else []
-    return did_you_mean(path.name, beside)
+    near = nearest(path.name, beside, alike=0.6 if len(path.name) > 3 else 0.75)
+    return _hint([str(Path(above, name)) for name in near])
 
 
 def _hint(near: list[str]) -> str | None:

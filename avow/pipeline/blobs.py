@@ -89,7 +89,7 @@ def _row(kind: Any) -> tuple[str, tuple[int, ...]]:
 
 
 def _is_place(name: str) -> bool:
-    return name in ("span", "spans") or name.endswith("_span")
+    return name in ("span", "spans") or name.endswith(("_span", "_spans"))
 
 
 @functools.cache

@@ -56,7 +56,7 @@ def in_workspace(plan: Path, piece: Piece, faults: list[Diagnostic]) -> Path | N
         return path
     else:
         message = f"there is no file {piece.text!r} in {folder}"
-        faults.append(Diagnostic("PLAN107", message, piece.span, hint=nearby(path)))
+        faults.append(Diagnostic("PLAN107", message, piece.span, hint=nearby(path, piece.text)))
     return None
 
 

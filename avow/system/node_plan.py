@@ -68,7 +68,7 @@ def _method(node: str, item: Piece, mapping: Piece | None, used: set[str], fault
         number += 1
     used.add(name)
     located = options.located()
-    located = replace(located, keys={**located.keys, (): item.key_span(backend)})
+    located = replace(located, key_spans={**located.key_spans, (): item.key_span(backend)})
     return Method(name, backend, located, options.texts("guarantees"))
 
 

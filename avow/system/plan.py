@@ -34,12 +34,12 @@ class Located:
     data: Any
     span: Span
     spans: Mapping[tuple[str | int, ...], Span] = field(default_factory=dict, compare=False, repr=False)
-    keys: Mapping[tuple[str | int, ...], Span] = field(default_factory=dict, compare=False, repr=False)
+    key_spans: Mapping[tuple[str | int, ...], Span] = field(default_factory=dict, compare=False, repr=False)
     """The same for the position of its key."""
 
     def key(self, *path: str | int) -> Span:
         """The place of a part's key; of its value, if it has none."""
-        return self.keys.get(path) or self.at(*path)
+        return self.key_spans.get(path) or self.at(*path)
 
     def at(self, *path: str | int) -> Span:
         """The place of a part, or of the nearest enclosing part that has one."""
@@ -127,7 +127,7 @@ class Statement:
     date: str = field(default="", metadata=codec.LATER)
     """The day (ISO 8601) on which it was assumed; empty: none is given."""
     span: Span | None = field(default=None, compare=False, repr=False)
-    ends: Span | None = field(default=None, compare=False, repr=False, metadata=codec.LATER)
+    until_span: Span | None = field(default=None, compare=False, repr=False, metadata=codec.LATER)
     """Where `until` is."""
     keys: str = field(default="", metadata=codec.LATER)
     """The plan's keys that lead to it: ``compose.D1.one_output``."""

@@ -208,7 +208,8 @@ class _PlanReader:
     def present(self, piece: Piece, path: Path) -> bool:
         if path.exists():
             return True
-        self.fault("PLAN107", f"there is no file {piece.text!r} in {self.path.parent}", piece.span, nearby(path))
+        near = nearby(path, piece.text)
+        self.fault("PLAN107", f"there is no file {piece.text!r} in {self.path.parent}", piece.span, near)
         return False
 
     def paths(self, *keys: str) -> Iterator[tuple[Piece, Path]]:

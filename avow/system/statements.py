@@ -52,7 +52,7 @@ def expired(system: System) -> Iterator[Diagnostic]:
         if _own(statement, system.plan) and "" < statement.until < datetime.now().astimezone().date().isoformat():
             text = f"{statement.keys} has expired: its last day was {statement.until}"
             hint = "decide whether it still holds, and give a new day: until: …"
-            yield Diagnostic("PLAN138", text, statement.ends, Severity.WARNING, hint)
+            yield Diagnostic("PLAN138", text, statement.until_span, Severity.WARNING, hint)
 
 
 def not_validated(system: System) -> Iterator[Diagnostic]:
@@ -164,4 +164,4 @@ def _statement(place: str, keys: str, piece: Piece, faults: list[Diagnostic]) ->
     faults += wrong_words(keys, piece)
     words = {key: texts.get(key, "") for key in ("says", "because", "who", "until", "date")}
     ends = piece.at("until")
-    return Statement(place, span=piece.span, ends=ends.span if ends is not None else None, keys=keys, **words)
+    return Statement(place, span=piece.span, until_span=ends.span if ends is not None else None, keys=keys, **words)

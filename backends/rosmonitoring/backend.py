@@ -75,7 +75,7 @@ class RosMonitoringBackend(Backend):
         problems = [*faults, *readings(found, job.method.options.at("mapping")), *overheads(job)[1]]
         for at, (name, digest) in enumerate(_traces(job).items()):
             path, span = inside(job.root, name), job.method.options.at("traces", at)
-            hint = nearby(job.root / name)
+            hint = nearby(job.root / name, name)
             if path is None or (not path.exists() and (hint or not digest)):  # of a bag with a digest, git has no copy
                 message = f"traces: there is no file {name!r} in the system's folder"
                 severity = Severity.WARNING if digest else Severity.ERROR
