@@ -92,7 +92,10 @@ def read(path: Path) -> Project:
         told = codec.parsed(text)
         found = codec.from_json(_Export, told if isinstance(told, dict) else {"requirements": told})
     except codec.Unreadable as error:
-        raise Rejected(Diagnostic("FRET001", f"{path} is no export of FRET's: {error}")) from None
+        found_at = re.search(r"line (\d+) column (\d+)", str(error))
+        line, column = (int(found_at[1]), int(found_at[2])) if found_at else (1, 1)
+        span = Span(str(path), line, column, line, column + 1)
+        raise Rejected(Diagnostic("FRET001", f"{path} is no export of FRET's: {error}", span)) from None
     requirements = (
         Requirement(r.reqid or f"R{k}", r.fulltext, _place(text, r.fulltext, str(path)), r.project or "")
         for k, r in enumerate(found.requirements, start=1)

@@ -293,3 +293,12 @@ def test_a_sentence_s_name_tells_assumptions_from_guarantees() -> None:
     found = to_fretish(contract(text))
     assert [line.partition(":")[0] for line in found.text.splitlines()] == ["A1_assumption", "assumed", "G1"]
     assert "presumably_assumed" in found.missing[0].message
+
+
+def test_a_fault_of_json_has_its_line_and_column(tmp_path: Path) -> None:
+    file = tmp_path / "f.json"
+    file.write_text('[{"reqid": "R1",\n "fulltext" "x"}]\n', "utf-8")
+    with pytest.raises(Rejected) as caught:
+        read(file)
+    (found,) = caught.value.diagnostics
+    assert (found.code, found.span and (found.span.line, found.span.column)) == ("FRET001", (2, 13))
