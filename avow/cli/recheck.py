@@ -7,10 +7,12 @@ from pathlib import Path
 
 import click
 
+from avow.assurance.naming import short
 from avow.assurance.rates import RateView, misstated
 from avow.base.codec import Foreign, Unreadable, document, from_json, parsed
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.files import read_regular
+from avow.base.plain import listed
 from avow.base.records import dataclass
 from avow.base.workspace import system_folder
 from avow.calculus.certificates import scope_of
@@ -18,9 +20,10 @@ from avow.calculus.induction import with_lemmas
 from avow.calculus.variables import frame
 from avow.calculus.wiring import wiring
 from avow.cli.options import ContractArgument, PathArgument, json_option
+from avow.evidence.claims import Reestablished
 from avow.kernel.certificate import Certificate, How
 from avow.kernel.check import Kernel, Refused
-from avow.kernel.statements import statements
+from avow.kernel.statements import Claimed, statements
 from avow.solving.apart import Both, versions
 from avow.system.load import load_path
 
@@ -28,6 +31,7 @@ from avow.system.load import load_path
 @dataclass(frozen=True, slots=True)
 class _Kernel(Foreign):
     certificates: Mapping[str, Certificate]
+    established: tuple[Reestablished, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,10 +86,12 @@ def command(path: Path, certificates: Path, as_json: bool) -> int:
     wired = wiring(frame(system))
     known = statements(wired)
     names = {(s.node, s.digest): s.name for s in known.every}
+    assumed = {(s.node, s.digest) for s in known.every if s.kind is Claimed.ASSUMPTION}
     try:
         kept = parsed(read_regular(certificates))
         whole = isinstance(kept, dict) and "kernel" in kept
         report = from_json(_Report, kept) if whole else None
+        proofs = {(p.scope, p.key): p.obligation for p in (report.kernel.established if report else ())}
         found = report.kernel.certificates if report else from_json(dict[str, Certificate], kept)
     except (OSError, Unreadable) as error:
         raise Rejected(Diagnostic("CLI005", f"{certificates} holds no certificates: {error}")) from error
@@ -118,7 +124,8 @@ def command(path: Path, certificates: Path, as_json: bool) -> int:
                     continue
                 called = ".".join(part for part in (entry.node, names.get((entry.node, entry.digest), "?")) if part)
                 try:
-                    true = kernel.establish(i)
+                    # as in a report: what an assumption's questions name is a claim of its own here
+                    true = kernel.establish(i, alone=(entry.node, entry.digest) in assumed)
                 except Refused as why:
                     refuse(scope, called, str(why))
                     continue
@@ -127,12 +134,17 @@ def command(path: Path, certificates: Path, as_json: bool) -> int:
                 if as_json:
                     continue
                 rests = f"on {rests_on} hypotheses" + (", vacuous" if true.vacuous else "")
-                click.echo(f"certified-{true.solvers}  {scope}: {called}, {rests}, key {true.key[:12]}")
+                of = proofs.pop((scope, true.key), "")
+                of = f", in the report {short(of)}" if of else ""
+                click.echo(f"certified-{true.solvers}  {scope}: {called}, {rests}, key {true.key[:12]}{of}")
     for requirement in report.requirements if report else ():
         if requirement.rate and (wrong := misstated(requirement.rate)):
             refuse(f"requirement {requirement.id}", "failure rate", wrong)
     if as_json:
         click.echo(document({"claims": told, "solvers": dict(versions())}))
     else:
+        if proofs:  # a loop's key is of several claims
+            names_of = listed([short(name) for name in proofs.values()])
+            click.echo(f"proofs of the report without a line (several claims together are a loop's): {names_of}")
         click.echo(", ".join(f"{name} {version}" for name, version in versions().items()))
     return 0 if all(claim.established for claim in told) else 1

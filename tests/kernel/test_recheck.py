@@ -9,6 +9,7 @@ import pytest
 from calculus.make import CONTRACTS, Limits, make, settle_all
 from calculus.test_commands import invoke
 
+from avow.assurance.naming import short
 from avow.base.codec import to_json
 from avow.base.diagnostics import Rejected
 from avow.base.verdict import Verdict
@@ -16,6 +17,7 @@ from avow.calculus.certificates import Certificates
 from avow.calculus.composition import compose
 from avow.calculus.obligations import composition_obligations, reestablished
 from avow.cli.recheck import command
+from avow.solving.apart import Both
 from avow.system.load import load_system
 from kernel.test_kernel import LOOP, PLAN, made
 
@@ -80,14 +82,34 @@ def test_nothing_to_establish_and_wrong_labels_are_no_success(tmp_path: Path) ->
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["remote_inspection", "remote_inspection_delayed", "remote_inspection_published"])
-def test_everything_that_is_proved_of_a_shipped_composition_has_a_certificate(name: str) -> None:
+def test_everything_that_is_proved_of_a_shipped_composition_has_a_certificate(name: str, tmp_path: Path) -> None:
+    """And `avow recheck` gives each proof the key and the grade that a report gives it."""
     system = load_system(CONTRACTS / name)
     composition = compose(system)
     obligations = composition_obligations(system)
     proved = [o for o in settle_all(composition, obligations, Limits()) if o.verdict is Verdict.PROVED]
     assert proved
-    again = Certificates(composition, composition.certificates.made)
-    for outcome in proved:
-        found = reestablished(again, outcome.obligation)
-        assert found is not None, outcome.obligation
-        assert outcome.details["certificate"]["key"] == found.key  # type: ignore[index]
+    told = []
+    with Both() as solvers:
+        again = Certificates(composition, composition.certificates.made, solvers=solvers)
+        for outcome in proved:
+            found = reestablished(again, outcome.obligation)
+            assert found is not None, outcome.obligation
+            assert outcome.details["certificate"]["key"] == found.key  # type: ignore[index]
+            told.append(found)
+    report = tmp_path / "report.json"
+    kept = composition.certificates.made
+    report.write_text(json.dumps({"kernel": {"certificates": to_json(kept), "established": to_json(told)}}))
+    code, text = invoke(command, str(CONTRACTS / name), str(report))
+    assert code == 0
+    lines, _, rest = text.partition("proofs of the report without a line")
+    for one in told:
+        (line,) = [
+            line for line in lines.splitlines() if line.endswith(f", in the report {short(one.obligation)}")
+        ] or [""]
+        if line:
+            assert line.startswith(f"certified-{one.solvers}  {one.scope}: ")
+            assert one.key[:12] in line
+        else:
+            assert ".loop." in one.obligation
+            assert short(one.obligation) in rest
