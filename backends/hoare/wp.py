@@ -1,7 +1,8 @@
 """Weakest preconditions and verification conditions (E. W. Dijkstra, "A Discipline of Programming", 1976).
 
-The condition of a loop is its invariant; that the invariant is kept, and suffices, are conditions of their own. Every
-assignment and test also demands that what it computes is defined: no division by zero, no negative natural number.
+The condition of a loop is its invariant, and the parts of the postcondition about variables that the loop does not
+assign; that the invariant is kept, and suffices for the rest, are conditions of their own. Every assignment and test
+also demands that what it computes is defined: no division by zero, no negative natural number.
 """
 
 from __future__ import annotations
@@ -68,8 +69,12 @@ class Conditions:
 
 def side_conditions(triple: Triple, body: Block) -> Conditions:
     """None met yet."""
-    targets = frozenset(s.target.name for s in statements(body) if isinstance(s, Assign | Update))
-    return Conditions(triple.pre, assigned=targets)
+    return Conditions(triple.pre, assigned=targets(body))
+
+
+def targets(body: Block) -> frozenset[str]:
+    """The names of the variables that some statements assign."""
+    return frozenset(s.target.name for s in statements(body) if isinstance(s, Assign | Update))
 
 
 def conditions(triple: Triple, body: Block) -> tuple[Condition, ...]:
@@ -152,7 +157,11 @@ def _match(statement: Match, post: t.Term, side: Conditions) -> t.Term:
 
 def _while(statement: While, post: t.Term, side: Conditions) -> t.Term:
     at, test, invariant = statement.span, statement.condition, statement.invariant
-    known = (side.known, invariant)
+    changed = targets(statement.body)
+    parts = post.items if isinstance(post, t.And) else (post,)
+    lasting = [part for part in parts if changed.isdisjoint(v.name for v in free_variables(part))]
+    wanted = conjunction(part for part in parts if part not in lasting)
+    known = (side.known, invariant, *lasting)
     line, name = f"loop-{at.line}-{at.column}", f"line {at.line}"
     kept: t.Term = invariant
     what = f"the loop at {name} keeps its invariant"
@@ -165,7 +174,7 @@ def _while(statement: While, post: t.Term, side: Conditions) -> t.Term:
     body = weakest(statement.body, kept, side)
     side.found.append(Condition(f"{line}-kept", (*known, test, *before), body, what, at))
     side.found.append(
-        Condition(f"{line}-suffices", (*known, negation(test)), post, f"the loop at {name} ends as wanted", at)
+        Condition(f"{line}-suffices", (*known, negation(test)), wanted, f"the loop at {name} ends as wanted", at)
     )
     side.found.append(Condition(f"{line}-test", known, defined(test), f"the loop's test at {name} is defined", at))
     if statement.variant is not None:
@@ -173,7 +182,7 @@ def _while(statement: While, post: t.Term, side: Conditions) -> t.Term:
         side.found.append(
             Condition(f"{line}-bounded", (*known, test), bounded, f"the variant at {name} is bounded", at)
         )
-    return invariant
+    return conjunction((invariant, *lasting))
 
 
 # -- assignments -------------------------------------------------------------------------------------------------------

@@ -306,6 +306,20 @@ def test_loops(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
+    ("loop", "verdict"),
+    [
+        ("n := n + 1", Verdict.PROVED),
+        ("n := n + 1\n  y := y", Verdict.UNKNOWN),
+        ("n := n + 1\n  y := y + 1", Verdict.REFUTED),
+    ],
+)
+def test_what_a_loop_does_not_assign_stays_without_an_invariant(tmp_path: Path, loop: str, verdict: Verdict) -> None:
+    rcl = small("out.y == in.b + 1", a="NATURAL")
+    program = f"y := b + 1\nn := 0\nWHILE n < a INVARIANT n <= a VARIANT a - n DO\n  {loop}"
+    assert verdicts(job(tmp_path, rcl, program))["G1"] is verdict
+
+
+@pytest.mark.parametrize(
     ("invariant", "variant"),
     some([("y == n * b", ""), ("TRUE", ""), ("FALSE", ""), ("y == n * b and n <= a", "VARIANT n")], 2, slow=2),
 )
