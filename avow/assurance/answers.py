@@ -380,8 +380,8 @@ class Answers:
 
     @property
     def legend(self) -> str:
-        """The meaning of the words in the column *how it stands*, for those that are used."""
-        return "; ".join(f"{level}: {MEANINGS[level]}" for level, _ in self.by_level)
+        """The meaning of the verdicts that hold, for those that are used."""
+        return "; ".join(f"{level}: {MEANINGS[level]}" for level, _ in self.by_level if level.holds)
 
     @property
     def beside(self) -> str:

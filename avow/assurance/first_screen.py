@@ -336,9 +336,8 @@ def _changed(changes: Changes) -> tuple[tuple[str, str], ...]:
         shown = [*shown[: LINES - 1], ("…", f"{len(left)} more" + (f", {better} of them better" if better else ""))]
     if not shown:
         shown = [("=", "Nothing.")]
-    return (
-        (*shown, ("⟲", f"re-run: {count(changes.again, 'guarantee')}, same answer")) if changes.again else tuple(shown)
-    )
+    again = [("⟲", f"re-run: {count(changes.again, 'guarantee')}, same answer")] * bool(changes.again)
+    return (*shown, *(again if not changes.entries else ()))
 
 
 def with_signature(case: Case) -> Answers:

@@ -49,7 +49,8 @@ def trust_lines(
     tools = Counter(tool for proof in proofs for tool in proof.tools)
     tools.update(_named(r) for v in views for r in v.records if weigh(r).support in _SAMPLED or weigh(r).refuted)
     if tools:
-        names = listed([f"{tool}: {count(many, 'answer')}" for tool, many in sorted(tools.items())], 9)
+        (tool, many), *others = sorted(tools.items())
+        names = listed([f"{tool}: {count(many, 'answer')}", *(f"{tool}: {many}" for tool, many in others)], 5)
         lines.append(
             TrustLine("tools whose answers have no certificate", names, "only a second method checks them", True)
         )

@@ -25,6 +25,8 @@ from avow.report.goals import doubts
 from avow.report.modules import NodeModule, RequirementModule, conditions, node_modules, requirement_modules
 from avow.report.page import fill, known_pages, svg_image
 
+KINDS = 8
+"""Kinds of deficit in words on the first screen, the weightiest first: a link counts and explains all."""
 _ORDER = (Tone.RED, Tone.AMBER, Tone.GREEN, Tone.GREY)
 WORDS = (
     *((level.value, meaning) for level, meaning in MEANINGS.items()),
@@ -57,6 +59,7 @@ def render_answers(case: Case, json_digest: str = "") -> str:
         weakest=wording.weakest,
         by_level=by_level,
         content=baseline_of(case).content,
+        kinds=KINDS,
         listed=case.listed,
         many=_many(case),
         others=lambda line: others(case, line),

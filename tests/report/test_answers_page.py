@@ -12,6 +12,7 @@ from assurance.sample import case as make_case
 from assurance.sample import evidence, guarantee, node_plan, rover_case, system
 
 from avow.assurance.answers import Failure, Level
+from avow.assurance.changes import baseline_of
 from avow.assurance.codec import read_case
 from avow.assurance.model import Case
 from avow.base.verdict import Verdict
@@ -90,8 +91,8 @@ def test_each_gate_that_fails_is_in_the_banner_and_each_hazard_on_the_first_scre
     failures = tuple(Failure(f"Gate {at}", "why", "") for at in range(4))
     page = render_answers(replace(found, answers=replace(found.answers, failures=failures)))
     told = " ".join(re.sub(r"<[^>]*>", " ", page).split())
-    assert "“Gate 1” fails." in told
-    assert "Also fail: Gate 2; Gate 3 ." in told
+    assert "“Gate 0” fails." in told
+    assert "Also fail: Gate 1; Gate 2; Gate 3 ." in told
     assert "✘ not shown H1 It burns (critical), H2 It burns (critical), H3" in told
     assert "H3 It burns (critical) and 5 more ; ◐ argued H0 It burns (critical) ." in told
     assert f"{found.gates[0].title}: {found.gates[0].state}." in page, "the gates by name, under the pointer"
@@ -169,6 +170,17 @@ FAULTS = {
 def test_in_a_browser_nothing_is_clipped_and_the_budgets_hold(name: str, tmp_path: Path) -> None:
     found = CASES[name]()
     assert departures(found, render_answers(found), tmp_path) == []
+
+
+@pytest.mark.slow
+@pytest.mark.needs_chromium
+def test_the_seven_answers_fit_a_screen_after_any_number_of_changes(tmp_path: Path) -> None:
+    signed = baseline_of(rover_case(), "f", "A. Person", "2026-11-20", "2027-11-20")
+    other = tuple((name, "", "shown", "in.r < 120 ∧ x > 1") for name, *_ in signed.requirements)
+    proved = tuple((name, "", "proved", "in.r < 120 ∧ x > 1", "") for name, *_ in signed.guarantees)
+    found = rover_case(baseline=replace(signed, requirements=other, guarantees=proved, deficits=()))
+    assert len(found.changes.entries) > 20
+    assert measure({"page": (render_answers(found), 1400)}, tmp_path)["page"]["bottom"] <= 1000
 
 
 @pytest.mark.slow
