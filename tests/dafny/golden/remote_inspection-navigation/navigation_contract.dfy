@@ -17,7 +17,7 @@ module {:options "--function-syntax:3"} Contract {
   predicate was_somewhere(in_last: (real, real) -> bool)
   { exists a: real, b: real :: was_somewhere_ex1(in_last, a, b) }
 
-  // guarantee arrives: If the robot is told to move to (x, y), then eventually it is at (x, y), to within the tolerance
+  // guarantee arrives: If the robot is told to move to (x, y), then it reports that it is at (x, y), to within the tolerance
   predicate arrives_all1(in_command: Types.CommandSet, out_at: (real, real) -> bool, x: real, y: real)
   { (in_command == Types.CommandSet.move(x, y)) ==> out_at(x, y) }
   predicate arrives(in_command: Types.CommandSet, out_at: (real, real) -> bool)
