@@ -40,6 +40,7 @@ class Code:
     code: str
     title: str
     explanation: str
+    """What is wrong; empty if the title says it."""
     example: str = ""
     severity: Severity = Severity.ERROR
     remedy: str = ""
@@ -102,7 +103,7 @@ def _read(codes: Mapping[str, Mapping[str, Any]]) -> dict[str, Code]:
         code: Code(
             code,
             said["title"],
-            said["means"],
+            said.get("means", ""),
             said.get("example", ""),
             Severity.WARNING if said.get("warning") else Severity.ERROR,
             said.get("remedy", ""),

@@ -77,7 +77,7 @@ def _explain(found: list[Diagnostic]) -> None:
     codes = _codes(found)
     for code in sorted({d.code for d in found} & set(codes)):
         known = codes[code]
-        click.echo(f"{code} ({known.title}): {known.explanation}{known.remedy and ' '}{known.remedy}\n")
+        click.echo(f"{code} ({known.title}): {' '.join(filter(None, (known.explanation, known.remedy)))}\n")
 
 
 def _codes(found: list[Diagnostic]) -> Mapping[str, Code]:

@@ -136,14 +136,15 @@ def test_every_code_says_what_it_means() -> None:
     for code in declared().values():
         assert FORM.fullmatch(code.code)
         assert code.title
-        assert code.explanation.endswith((".", "`)", ".)")), code.code
+        assert not code.explanation or code.explanation.endswith((".", "`)", ".)")), code.code
+        assert code.explanation or code.remedy, code.code
         assert code.remedy.endswith((".", "`")) or code.code in sections()[LANGUAGE], code.code
 
 
 def page_entry(code: Code) -> str:
     """A code in `docs/diagnostics.md`."""
     mark = "" if code.severity is Severity.ERROR else f" ({code.severity})"
-    return f"**{code.code}{mark}, {code.title}.** {code.explanation} {code.remedy}".strip()
+    return " ".join(filter(None, (f"**{code.code}{mark}, {code.title}.**", code.explanation, code.remedy)))
 
 
 def test_the_page_is_in_step() -> None:
