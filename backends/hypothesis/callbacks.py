@@ -22,6 +22,7 @@ from avow.backend_kit.programs.compared import stamp_of
 from avow.backend_kit.programs.cpython import Replies
 from avow.backend_kit.protocol import Backend, Job, JudgedRun, Limits, Report
 from avow.backend_kit.registry import judge_of_runs
+from avow.base.codec import document
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.verdict import Counterexample, Isolation, Object, Outcome, Verdict
 from avow.evidence.obligation import Obligation
@@ -86,7 +87,7 @@ def settle(job: Job, limits: Limits, version: str) -> Report:
         again: dict[str, object] = {RETRY: True} if isinstance(rejected, Silent) else {}
         return replace(report, outcomes=tuple(replace(o, details=dict(again)) for o in report.outcomes))
     outcomes = tuple(replace(o, of=Object.SOURCE, numbers="float64") for o in outcomes)
-    return Report(outcomes, "hypothesis", version, (), work.logs, tuple(work.observed), work.isolation)
+    return Report(outcomes, "hypothesis", version, (), {"runs.json": work.log()}, tuple(work.observed), work.isolation)
 
 
 def _work(job: Job, backend: Backend, limits: Limits) -> _Work:
@@ -121,7 +122,6 @@ class _Work:
     """Messages of a run."""
     observed: dict[Observed, None] = field(default_factory=dict)
     isolation: Isolation = Isolation.SEALED
-    logs: dict[str, str] = field(default_factory=dict)
     messages: int = 0
     runs: int = 0
     rejected: int = 0
@@ -346,6 +346,12 @@ class _Work:
         found |= {"begins": self.driver.topics.state} if self.driver.topics.state else {}
         found |= {"unanswered": self.unanswered} if self.unanswered else {}
         return found | {"seed": self.limits.seed}
+
+    def log(self) -> str:
+        """The runs in numbers, guarantee by guarantee, and the first ones in full: what the class heard and said."""
+        first = self.first[: tuning.LOGGED_RUNS]
+        runs = [{"heard": heard, "said": run.said, "raised": run.wrong} for heard, run in first]
+        return document({**self.bound(), "guarantees": self.counts, "first runs": runs}) + "\n"
 
     def settled(self, obligation: Obligation, stopped: str, unsteady: str, wrong: Sequence[Counterexample]) -> Outcome:
         count = self.counts[obligation.name]

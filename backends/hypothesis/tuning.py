@@ -24,6 +24,9 @@ SECONDS_OFTEN = 3.0
 APART = 4
 """Cases in which NaN, the infinities and the negative zero are tried: a fault there rarely depends on other inputs."""
 
+LOGGED_RUNS = 3
+"""Runs of a callback class that its log has in full, so that a reader sees what a run is; the seed gives all."""
+
 OPAQUE_VALUES = 4
 """Elements of an opaque type, and of a relation: so few that two draws are often equal."""
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
@@ -56,6 +57,19 @@ def test_right_classes_are_tested_of_their_source(tmp_path: Path, kind: str, tex
     assert {o.verdict for o in found.values()} == {Verdict.TESTED}, found
     assert {(o.of, o.numbers, o.vacuous) for o in found.values()} == {(Object.SOURCE, "float64", False)}
     assert found["high"].bound["runs"] == 15
+
+
+@pytest.mark.slow
+def test_the_log_has_the_counts_and_some_runs_in_full(tmp_path: Path) -> None:
+    given = job(tmp_path / "w", "rospy", DIRECT)
+    report = one_step.discharge(TOOL, given, given.root, Limits())
+    log = json.loads(report.logs["runs.json"])
+    for outcome in report.outcomes:
+        count = log["guarantees"][outcome.obligation.rpartition("/")[2]]
+        told = [outcome.bound[key] for key in ("runs", "cases", "seed", "judged", "triggered")]
+        assert told == [log["runs"], log["cases"], log["seed"], count["held"], min([log["runs"], *count["met"]])]
+    first = log["first runs"][0]
+    assert first["heard"][0]["topic"] != first["said"][0]["topic"]
 
 
 @pytest.mark.slow
