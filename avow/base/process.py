@@ -20,7 +20,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from avow.base.tuning.running import FORK_LOOK
+from avow.base.tuning.running import FORK_LOOK, PROCESSOR_LOOK, WALL
 from avow.base.tuning.sizes import OUTPUT_KEPT
 
 _FROM_OUTSIDE = frozenset({-signal.SIGHUP, -signal.SIGINT, -signal.SIGKILL, -signal.SIGTERM, -signal.SIGXFSZ})
@@ -185,8 +185,8 @@ def _kill_group(pid: int) -> None:
         os.killpg(pid, signal.SIGKILL)
 
 
-def _descendants(pid: int) -> list[int]:
-    children = _parents()
+def _descendants(pid: int, known: Mapping[int, Sequence[bytes]] | None = None) -> list[int]:
+    children = _parents(_processes() if known is None else known)
     found: list[int] = []
     todo = [pid]
     while todo:
@@ -196,16 +196,48 @@ def _descendants(pid: int) -> list[int]:
     return found
 
 
-def _parents() -> dict[int, list[int]]:
-    """Process → its children. Read from /proc; empty where there is none."""
+def _parents(known: Mapping[int, Sequence[bytes]]) -> dict[int, list[int]]:
+    """Process → its children."""
     children: dict[int, list[int]] = {}
+    for pid, fields in known.items():
+        children.setdefault(int(fields[1]), []).append(pid)
+    return children
+
+
+def _processes() -> dict[int, list[bytes]]:
+    """Process → the fields of its `stat` behind its name. Read from /proc; empty where there is none."""
+    found: dict[int, list[bytes]] = {}
     with contextlib.suppress(OSError), os.scandir("/proc") as processes:
         for name in [entry.name for entry in processes if entry.name.isdigit()]:
-            with contextlib.suppress(OSError, ValueError, IndexError), open(f"/proc/{name}/stat", "rb", 0) as stat:  # noqa: PTH123 - there are many
+            with contextlib.suppress(OSError), open(f"/proc/{name}/stat", "rb", 0) as stat:  # noqa: PTH123 - there are many
                 # the name in parentheses may contain spaces and parentheses
-                fields = stat.read(4096).rpartition(b")")[2].split()
-                children.setdefault(int(fields[1]), []).append(int(name))
-    return children
+                if len(fields := stat.read(4096).rpartition(b")")[2].split()) > 14:
+                    found[int(name)] = fields
+    return found
+
+
+class Stopwatch:
+    """The processor seconds that this process and all that it started have used since, so that a limit does not depend
+    on the machine's load; or the `WALL`-th part of the time on the clock if that is more, as for a program that
+    sleeps."""
+
+    def __init__(self) -> None:
+        self._wall, self._looked, self._last = time.monotonic(), 0.0, 0.0
+        self._begun = _processor_seconds()
+
+    def __call__(self) -> float:
+        now = time.monotonic()
+        if now - self._looked > PROCESSOR_LOOK:
+            self._looked = now
+            self._last = max(self._last, _processor_seconds() - self._begun, (now - self._wall) / WALL)
+        return self._last
+
+
+def _processor_seconds() -> float:
+    """Of this process and of its descendants, those that have ended included."""
+    known = _processes()
+    ticks = sum(int(field) for pid in _descendants(os.getpid(), known) for field in known[pid][11:15])
+    return sum(os.times()[:4]) + ticks / os.sysconf("SC_CLK_TCK")
 
 
 _PR_SET_PDEATHSIG = 1
@@ -291,7 +323,7 @@ def guard(*, tied: bool) -> None:
 
 def children(pid: int) -> list[int]:
     """The processes that a process has started or adopted."""
-    return _parents().get(pid, [])
+    return _parents(_processes()).get(pid, [])
 
 
 def _before_exec(megabytes: int | None) -> Callable[[], None]:

@@ -11,6 +11,7 @@ from typing import Any
 from avow.backend_kit.protocol import Limits, Report
 from avow.base.codec import Unreadable, canonical, from_text, to_json
 from avow.base.records import dataclass
+from avow.base.tuning.running import WALL
 
 Tools = tuple[tuple[str, ...], ...]
 """Name, version, … of each outside tool, as the keys have them; no version where it is missing."""
@@ -51,7 +52,7 @@ class Request:
     @property
     def seconds(self) -> float:
         """Limits for all its obligations together."""
-        return self.limits.seconds * max(2, len(self.keys))
+        return self.limits.seconds * max(WALL + 1, len(self.keys))
 
 
 @dataclass(frozen=True, slots=True)

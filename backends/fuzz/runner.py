@@ -13,7 +13,6 @@ import signal
 import subprocess
 import sys
 import tempfile
-import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,7 +20,7 @@ from typing import Any, assert_never
 
 from avow.base import process
 from avow.base.codec import Unreadable, from_text
-from avow.base.tuning.running import SUBJECT_PATIENCE
+from avow.base.tuning.running import SUBJECT_PATIENCE, WALL
 from avow.base.tuning.sizes import LOG_KEPT
 from avow.base.verdict import Isolation
 from avow.isolation import judge
@@ -213,7 +212,7 @@ def _ended(
         process.watch(started.pid)
         code: int | None = None
         with contextlib.suppress(subprocess.TimeoutExpired):
-            code = started.wait(question.seconds)
+            code = started.wait(question.seconds * WALL)
         process.kill_tree(started.pid)
         started.wait()
         process.unwatch(started.pid)
@@ -228,14 +227,14 @@ def answered(asked: Runs, question: Question) -> Answered:
     """The runs, each on a node of its own; and once more in reverse order, by another process, with a build in which
     uninitialised memory holds other bytes: an answer that depends on chance, the clock, such bytes, or earlier runs is
     not accepted."""
-    end = time.monotonic() + question.seconds
-    first, faults, program = _all(asked.program, asked.runs, asked.crashes, question, end)
+    spent = process.Stopwatch()
+    first, faults, program = _all(asked.program, asked.runs, asked.crashes, question, spent)
     silent = bool(program.silent)
     unsteady = None
     if asked.twin and not faults:
         order = [k for k in reversed(range(len(first))) if not first[k].crash]
         runs = [asked.runs[k] for k in order]
-        again, faults, twin = _all(asked.twin, runs, asked.crashes, question, end)
+        again, faults, twin = _all(asked.twin, runs, asked.crashes, question, spent)
         silent = bool(twin.silent)
         for k, other in zip(order, again, strict=False):
             if other != first[k]:
@@ -245,7 +244,7 @@ def answered(asked: Runs, question: Question) -> Answered:
 
 
 def _all(
-    path: str, runs: Sequence[tuple[str, ...]], most: int, question: Question, end: float
+    path: str, runs: Sequence[tuple[str, ...]], most: int, question: Question, spent: process.Stopwatch
 ) -> tuple[list[Run], str, _Program]:
     program = _Program(Path(path), SUBJECT_PATIENCE, Path(question.root))
     found: list[Run] = []
@@ -253,7 +252,7 @@ def _all(
     fault = ""
     try:
         for run in runs:
-            if time.monotonic() > end:
+            if spent() > question.seconds:
                 break
             replies = program.ask_all([{"command": command} for command in ("N", *run)])
             failed = next((r for r in replies if isinstance(r, SubjectFailed)), None)

@@ -7,7 +7,6 @@ import os
 import random
 import re
 import tempfile
-import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -20,7 +19,8 @@ from avow.base.codec import canonical, to_json
 from avow.base.diagnostics import Rejected
 from avow.base.files import sha256
 from avow.base.plain import ALLOWS_MORE
-from avow.base.process import ToolMissing
+from avow.base.process import Stopwatch, ToolMissing
+from avow.base.tuning.running import WALL
 from avow.base.verdict import Isolation, Object, Outcome, Verdict
 from avow.drive.steps import coded, plain
 from avow.evidence.obligation import ProgramClaim
@@ -108,11 +108,11 @@ class Work:
     isolation: Isolation = Isolation.SEALED
     logs: dict[str, str] = field(default_factory=dict)
     command: tuple[str, ...] = ()
-    _end: float = field(init=False)
+    _spent: Stopwatch = field(init=False)
     _outside: Outside = field(init=False)
 
     def __post_init__(self) -> None:
-        self._end = time.monotonic() + self.limits.seconds * 0.9
+        self._spent = Stopwatch()
         self._outside = Outside(tools())
 
     @property
@@ -167,7 +167,7 @@ class Work:
     # -- steps -------------------------------------------------------------------------------------------
 
     def _left(self) -> float:
-        return max(1.0, self._end - time.monotonic())
+        return max(1.0, self.limits.seconds * 0.9 - self._spent())
 
     def _ask(self, kind: type[T], ask: Campaign | Runs | Show) -> T:
         place = self.folder / "question.json"
@@ -178,14 +178,14 @@ class Work:
             str(Path(__file__).with_name("runner.py").resolve()),
             [str(place)],
             cwd=self.folder,
-            seconds=self._left() + 20.0,
+            seconds=self._left() * WALL + 20.0,
             megabytes=0,  # sanitizers reserve terabytes of addresses
             env={"PYTHONHASHSEED": "0"},
         )
         if answer is None:
             if done.timed_out:
                 raise Unanswered(
-                    Verdict.UNKNOWN, f"it did not end within {self.limits.seconds:g} s; {ALLOWS_MORE}", True
+                    Verdict.UNKNOWN, f"it did not end within {self.limits.seconds * WALL:g} s; {ALLOWS_MORE}", True
                 )
             last = done.stderr.strip().splitlines()[-1:] or ["no message"]
             raise Unanswered(Verdict.ERROR, f"its judge ended without an answer: {last[0][:200]}", True)

@@ -17,6 +17,7 @@ from avow.base.codec import document
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.plain import ALLOWS_MORE
 from avow.base.process import Completed, ToolMissing
+from avow.base.tuning.running import WALL
 from avow.base.verdict import Counterexample, Object, Outcome, Verdict, bound
 from avow.evaluation.evaluate import evaluate
 from avow.evidence.obligation import Obligation
@@ -134,7 +135,7 @@ def _run(job: Job, place: Path, limits: Limits) -> tuple[Completed | None, Answe
             "run.py",
             [str(max(1.0, limits.seconds * 0.8)), str(limits.seed)],
             cwd=place,
-            seconds=limits.seconds,
+            seconds=limits.seconds * WALL,
             megabytes=limits.megabytes,
             env={
                 "HYPOTHESIS_STORAGE_DIRECTORY": str(place / ".hypothesis"),
@@ -150,7 +151,7 @@ def _silence(done: Completed | None, limits: Limits) -> str:
     if done is None:
         return "Python could not be started"
     if done.timed_out:
-        return f"the test did not end within {limits.seconds:g} s; {ALLOWS_MORE}"
+        return f"the test did not end within {limits.seconds * WALL:g} s; {ALLOWS_MORE}"
     last = done.stderr.strip().splitlines()[-1:] or ["no message"]
     return f"the test ended without a result (code {done.code}): {last[0][:300]}"
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import json
 import math
-import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
@@ -24,6 +23,7 @@ from avow.backend_kit.protocol import Backend, Job, JudgedRun, Limits, Report
 from avow.backend_kit.registry import judge_of_runs
 from avow.base.codec import document
 from avow.base.diagnostics import Diagnostic, Rejected
+from avow.base.process import Stopwatch
 from avow.base.verdict import Counterexample, Isolation, Object, Outcome, Verdict
 from avow.evidence.obligation import Obligation
 from avow.evidence.record import CASE, RETRY
@@ -132,12 +132,14 @@ class _Work:
     failing: dict[str, Messages] = field(default_factory=dict)
     """Guarantee → a run that violates it, or in which the class raises."""
     first: list[tuple[Messages, Run]] = field(default_factory=list)
+    spent: Stopwatch = field(default_factory=Stopwatch)
     end: float = 0.0
+    """The processor seconds after which no more is tried."""
     stamped: dict[str, bool] = field(default_factory=dict)
     """Output's topic → whether a publication had the stamp of a message received."""
 
     def outcomes(self) -> tuple[Outcome, ...]:
-        self.end = time.monotonic() + self.limits.seconds
+        self.end = self.limits.seconds
         self.counts = {o.name: _Count() for o in self.job.obligations}
         self.put(list(self.kept()), drawn=False)
         stopped = self.sweep()
@@ -153,7 +155,7 @@ class _Work:
         """Run the drawn messages; the reason if there are too few."""
         number, many = 0, cases(self.job)
         while self.messages < many and len(self.failing) < len(self.counts):
-            if time.monotonic() > self.end:
+            if self.spent() > self.end:
                 return f"only {self.messages} of {many} messages in the time given"
             made: list[Messages] = []
             left = many - self.messages
@@ -294,8 +296,8 @@ class _Work:
 
     def smaller(self, name: str, best: Messages) -> Messages:
         """The run without unnecessary messages: first the last alone, then halves, then without one at a time."""
-        end = min(self.end, time.monotonic() + tuning.SHRINKING_SECONDS)
-        while len(best) > 1 and time.monotonic() < end:
+        end = min(self.end, self.spent() + tuning.SHRINKING_SECONDS)
+        while len(best) > 1 and self.spent() < end:
             half = len(best) // 2
             tried = [best[-1:], best[half:], best[:half]] if half > 1 else []
             tried += [best[:k] + best[k + 1 :] for k in range(len(best))]

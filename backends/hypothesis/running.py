@@ -13,7 +13,6 @@ import itertools
 import os
 import pickle
 import sys
-import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
@@ -25,7 +24,7 @@ from hypothesis.errors import FailedHealthCheck, Flaky, Unsatisfiable, Unsatisfi
 from hypothesis.internal.conjecture import providers
 from hypothesis.stateful import get_state_machine_test
 
-from avow.base.process import adopt_orphans
+from avow.base.process import Stopwatch, adopt_orphans
 from avow.base.tuning.running import SUBJECT_PATIENCE
 from avow.evaluation.running import Keeper
 from avow.formulas.temporal.cells import Records
@@ -85,7 +84,7 @@ class Bench:
 
     def __init__(self, asked: Question, seconds: float, start: int) -> None:
         self.asked, self.seed = asked, start
-        self.end = time.monotonic() + seconds
+        self.spent, self.end = Stopwatch(), seconds
         self.inputs = {p.name: p.sort for p in asked.inputs}
         self.outputs = {p.name: p.sort for p in asked.outputs}
         self.doubles = asked.numbers != EXACT
@@ -184,7 +183,7 @@ class Bench:
         """One case, or one step of a run: the test is called, and the result is judged."""
         if self._over:
             return
-        if time.monotonic() > self.end:
+        if self.spent() > self.end:
             raise self._stop("time")
         if self.shrinking is None and self.valid >= self.asked.cases and self._all_met():
             raise self._stop()
@@ -287,7 +286,7 @@ class Bench:
                 with contextlib.suppress(_Stop):
                     self.unsteady = self.unsteady or self._asked_again()
                     apart = self._asked_apart() if self.doubles else []
-                stopped = stopped or ("again" if time.monotonic() > self.end else "")
+                stopped = stopped or ("again" if self.spent() > self.end else "")
         finally:
             fault = self.unit.process.close()
         if self.differs and not fault:
@@ -321,7 +320,7 @@ class Bench:
         """Find the simplest run that violates a guarantee (or in which the unit fails), within the time, and repeat it
         in a process of its own."""
         first, end = self.traces.get(name, []), self.end
-        self.shrinking, self.end = name, min(end, time.monotonic() + SHRINKING_SECONDS)
+        self.shrinking, self.end = name, min(end, self.spent() + SHRINKING_SECONDS)
         with contextlib.suppress(_Broken, _Stop, Flaky, Unsatisfiable, FailedHealthCheck):
             self._run_test((Phase.generate, Phase.shrink))
         self.shrinking, self.end = None, end
@@ -386,7 +385,7 @@ class Bench:
         """Repeat the first inputs of a few runs, so that counters and delays expire."""
         for inputs in self._starts if self._runs and not self.crash else ():
             left = [name for name in self.guarantees if name not in self.traces]
-            if left and time.monotonic() < self.end:
+            if left and self.spent() < self.end:
                 self.traces |= self._replayed(itertools.repeat(inputs, tuning.LONGEST_RUN), *left)
 
     def _asked_again(self) -> Inputs | None:
@@ -398,13 +397,13 @@ class Bench:
         twice = [request for request in short for _ in range(2)]
         with self._twin() as twin:
             for before in _batches(requests):
-                if time.monotonic() > self.end:
+                if self.spent() > self.end:
                     raise _Stop("again")
                 for inputs, _ in twin.differing(before):
                     return inputs
-            end = min(self.end, time.monotonic() + tuning.SECONDS_OFTEN)
+            end = min(self.end, self.spent() + tuning.SECONDS_OFTEN)
             for before in itertools.islice(itertools.cycle(_batches(twice)), tuning.ASKED_OFTEN // BATCH):
-                for inputs, reply in twin.differing(before) if time.monotonic() < end else ():
+                for inputs, reply in twin.differing(before) if self.spent() < end else ():
                     if self._breaks(inputs, reply):
                         return inputs
         return None
@@ -425,7 +424,7 @@ class Bench:
         with self._twin():
             for inputs in self._starts:
                 for name, (word, text) in itertools.product(reals, SPECIAL.items()):
-                    if time.monotonic() > self.end:
+                    if self.spent() > self.end:
                         raise _Stop("again")
                     zero = {**inputs, name: Fraction(0)}
                     self.keeper.restart()

@@ -11,6 +11,7 @@ import pytest
 from helpers import alive
 
 from avow.base import process
+from avow.base.tuning.running import WALL
 from avow.base.tuning.sizes import OUTPUT_KEPT
 
 
@@ -101,3 +102,18 @@ def test_what_we_end_ourselves_was_not_ended_by_others(monkeypatch: pytest.Monke
     monkeypatch.setattr(process.here, "ended_by_others", False)
     assert process.run([sys.executable, "-c", "import time; time.sleep(60)"], seconds=0.2).timed_out
     assert not process.ended_by_others()
+
+
+def test_a_stopwatch_counts_processor_seconds_of_all_that_was_started_and_not_the_machines_load() -> None:
+    watch = process.Stopwatch()
+    busy = "import time\nend = time.process_time() + 0.6\nwhile time.process_time() < end: pass\n{}"
+    with subprocess.Popen([sys.executable, "-c", busy.format("input()")], stdin=subprocess.PIPE) as lasting:
+        process.run([sys.executable, "-c", busy.format("")])
+        begun = time.monotonic()
+        while watch() < 1.1 and time.monotonic() < begun + 60:
+            time.sleep(0.05)
+        assert watch() >= 1.1, "both, the one that has ended and the one that still runs"
+        lasting.kill()
+    still, begun = process.Stopwatch(), time.monotonic()
+    time.sleep(0.5)
+    assert (time.monotonic() - begun) / WALL <= still() < 0.4

@@ -34,6 +34,12 @@ CLUSTER_PATIENCE = 60.0
 WORKER_GRACE = 90.0
 """Seconds above the tool's own limits that a worker gets to translate and write."""
 
+WALL = 5
+"""A limit of processor seconds ends after so many times that time on the clock at the latest: a program may sleep."""
+
+PROCESSOR_LOOK = 0.1
+"""Seconds between two looks at the processor time used: a look takes a millisecond."""
+
 FORK_LOOK = 0.5
 """Seconds between two looks whether a work is still wanted."""
 
