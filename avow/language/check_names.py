@@ -10,11 +10,11 @@ from avow.base.diagnostics import Span
 from avow.base.plain import count
 from avow.base.suggestions import did_you_mean
 from avow.language.conversions import convert
-from avow.language.foreign import FIELDS, FOREIGN_NAMES
+from avow.language.foreign import APART, FIELDS, WORDS
 from avow.language.lexer import KEYWORDS, Token, unquote
 from avow.language.printer import show_sort
 from avow.language.scope import Scope
-from avow.language.sorts import BOOL, INTEGER, NATURAL, REAL, STRING, EnumSort, FunctionSort, Sort, TupleSort
+from avow.language.sorts import BOOL, INTEGER, NATURAL, REAL, STRING, EnumSort, Sort, TupleSort
 from avow.language.source import Reports
 from avow.language.syntax import BuiltinName, Name, NodePort, Number, Syntax, TermSyntax, Text
 from avow.language.terms import Construct, EnumValue, Item, Literal, Past, Role, Term, Variable
@@ -34,11 +34,7 @@ class Names(ABC):
         if term is None or term.sort == BOOL:
             return term
         shown = show_sort(term.sort)
-        hint = "compare it with something: `… == …`"
-        if isinstance(term, EnumValue | Construct):
-            hint = "compare each time: `s == red or s == green`, or `s in {red, green}`"
-        if isinstance(term.sort, FunctionSort) and term.sort.result == BOOL:
-            hint = f"apply it to its {len(term.sort.parameters)} argument(s)"
+        hint = "compare it each time, as in `s == red or s == green`, or apply it to its arguments"
         message = f"this must be true or false, and it is of type {shown}"
         self.error("RCL301", message, tree, hint=hint, notes=self.declared(term))
         return None
@@ -93,11 +89,8 @@ class Names(ABC):
             return None
         converted = convert(term, sort)
         if converted is None:
-            hint = None
-            if sort == NATURAL and term.sort == INTEGER:
-                hint = "it may be negative; say it the other way round, as in `exists(j in NATURAL | j + 1 == i and …)`"
             message = f"{what} must be of type {show_sort(sort)} and is of type {show_sort(term.sort)}"
-            self.error("RCL303", message, tree, hint=hint, notes=self.declared(term))
+            self.error("RCL303", message, tree, notes=self.declared(term))
         return converted
 
     # --- literals ----------------------------------------------------------------------------------------------------
@@ -116,8 +109,7 @@ class Names(ABC):
     # --- names -------------------------------------------------------------------------------------------------------
 
     def builtin(self, tree: BuiltinName) -> None:
-        hint = "a type is declared with `:`, a constant with `=`" if not self.scope.node else None
-        self.error("RCL204", f"{tree.text} is a type, not a value", tree, hint=hint)
+        self.error("RCL204", f"{tree.text} is a type, not a value", tree)
 
     def name(self, tree: Name, expected: Sort | None) -> Term | None:
         name = tree.text
@@ -161,13 +153,11 @@ class Names(ABC):
         """Reports an undeclared name; `text`: a string is expected."""
         if self.scope.is_broken(name) or tree.start in self.reports.odd:  # the latter is reported by the lexer
             return
-        hint = FOREIGN_NAMES.get(name.casefold()) or did_you_mean(name, self.scope.known())
+        hint = WORDS.get(name.casefold()) or did_you_mean(name, self.scope.known())
         if hint is None and text:
             hint = f'write texts in quotation marks: `"{name}"`'
         if hint is None and what == "name":
             hint = "declare it in the context, among the inputs or outputs, or in a quantifier: `exists(x in REAL | …)`"
-            if self.scope.node is None and not self.scope.nodes:
-                hint = f"`Name = {{{name}, …}};` declares it as an element"
         self.error("RCL201", f"the {what} `{name}` is not declared", tree, hint=hint)
 
     def element(self, name: str, tree: Syntax) -> Term | None:
@@ -201,13 +191,11 @@ class Names(ABC):
             self.error("RCL203", f"the {role}puts of a node have no place here: `{role}.{name}`", tree)
             return
         other = Role.OUTPUT if role is Role.INPUT else Role.INPUT
-        environment = scope.environment
-        longer = [f"`{role}.{port}`" for port in scope.ports(role) if port.startswith(f"{name}_")]  # for `name.field`
-        hint = f"did you mean {' or '.join(longer[:8])}?" if longer else did_you_mean(name, scope.ports(role))
+        hint = did_you_mean(name, scope.ports(role))
         if name in scope.ports(other):
             hint = f"it is an {other}put: write `{other}.{name}`"
-        elif environment.sort(name) is not None or name in environment.constants or name in environment.elements:
-            hint = f"`{name}` is declared in the context: write `{name}` alone"
+        elif taken := scope.taken(name):
+            hint = f"write `{name}` alone: it is {taken[0]}"
         self.error("RCL203", f"{scope.named} has no {role}put `{name}`", tree, hint=hint)
 
     def field(self, record: Term | None, name: str, tree: Syntax) -> Term | None:
@@ -220,29 +208,19 @@ class Names(ABC):
             return Item(record, position, sort.items[position], self.span(tree)).rebuild((record,))
         labels = sort.labels if isinstance(sort, TupleSort) else ()
         hint = did_you_mean(name, labels) or f"its fields are {', '.join(labels)}" if labels else FIELDS
-        shown = self.text(tree).removesuffix(f".{name}")
-        if name in ("length", "size", "len", "count"):
-            hint = f"write `length({shown})`"
-        elif isinstance(sort, TupleSort) and not labels:
-            way = f"`exists(a, b in REAL | {shown} == (a, b) and …)`"
-            hint = f"take a tuple apart by its items, {way}, or make it a record"
+        if not labels:
+            hint = WORDS.get(name) or (APART if isinstance(sort, TupleSort) else hint)
         self.error("RCL312", f"a value of type {show_sort(sort)} has no field `{name}`", tree, hint=hint)
         return None
 
     def elsewhere(self, before: str, name: str, tree: Syntax) -> None:
         """Reports `before.name` inside a node: a misspelt role, a field, or another node's variable."""
         scope = self.scope
-        own = [f"{r}.{name}" for r in (Role.INPUT, Role.OUTPUT) if name in scope.ports(r)]
-        word = {"in": "in", "input": "in", "out": "out", "output": "out"}.get(before.casefold().removesuffix("s"))
+        own = [f"`{r}.{name}`" for r in (Role.INPUT, Role.OUTPUT) if name in scope.ports(r)]
         message = f"`{before}.{name}` has no meaning inside a node"
-        if word is not None:
-            hint = f"write `{word}.{name}`"
-        elif scope.environment.sort(before) is not None:
-            declared = name in scope.environment.elements or name in scope.environment.constants
-            message, hint = f"`{before}` is a type and has no fields", f"write `{name}` alone" if declared else FIELDS
-        else:
-            hint = f"write {' or '.join(f'`{o}`' for o in own) or f'`in.{name}` or `out.{name}`'}"
-            hint += ": a contract speaks of its own inputs and outputs only"
+        hint = f"write {' or '.join(own) or '`in.…` or `out.…`'}: a contract speaks of its own inputs and outputs only"
+        if scope.environment.sort(before) is not None:
+            message, hint = f"`{before}` is a type and has no fields", "write its elements alone"
         self.error("RCL205", message, tree, hint=hint)
 
     def node_port(self, tree: NodePort) -> Term | None:

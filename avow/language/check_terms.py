@@ -12,6 +12,7 @@ from avow.language import syntax
 from avow.language import terms as t
 from avow.language.check_names import Names
 from avow.language.conversions import NUMERIC, WHOLE, alike, common, convert, joined, widen
+from avow.language.foreign import APART
 from avow.language.lexer import Token
 from avow.language.operators import OPERATORS, Mistyped, operation
 from avow.language.printer import show_sort
@@ -63,12 +64,7 @@ class Terms(Names):
                 return self.index(tree, function, arguments, item)
         self.terms(arguments)
         message = f"`{self.text(head)}` is of type {show_sort(function.sort)}: it is no function and takes no arguments"
-        hint = None
-        if isinstance(function.sort, s.TupleSort):
-            hint = f"take a tuple apart by its items: `exists(a, b in REAL | {self.text(head)} == (a, b) and …)`"
-        elif len(arguments) == 1:
-            hint = f"compare it: `{self.text(head)} == {self.text(arguments[0])}`"
-        self.error("RCL304", message, tree, hint=hint)
+        self.error("RCL304", message, tree, hint=APART if isinstance(function.sort, s.TupleSort) else None)
         return None
 
     def arguments(
@@ -365,8 +361,6 @@ class Terms(Names):
         for tree, one, other in ((left_tree, left, right), (right_tree, right, left)):
             if isinstance(one.sort, s.FunctionSort) and one.sort.result == other.sort:
                 return f"apply `{self.text(tree)}` to its {count(len(one.sort.parameters), 'argument')} first"
-            if isinstance(one.sort, s.EnumSort) and isinstance(other, t.Literal) and other.value in one.sort.members:
-                return f"write `{other.value}` without quotation marks"
             if isinstance(one.sort, s.EnumSort) and other.sort in (s.BOOL, s.STRING, s.NATURAL):
                 return f"the values of {one.sort.name} are {', '.join(one.sort.members[:6])}"
         return None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from avow.language.foreign import OPERATORS
+from avow.language.foreign import WORDS
 from avow.language.lexer import KEYWORDS, LIMITED, SYMBOLS, Token
 from avow.language.source import Reports
 
@@ -42,11 +42,10 @@ _IN_FORMULA = {
     "ARROW": "implication is written `->`",
     "LBRACE": "`{ … }` is a set: group formulas by `( … )`",
     "BAR": "a bar stands in quantifiers only; the length of a sequence is `length(s)`",
-    "COMMA": "join formulas by `and`; write sets with braces: `x in {a, b}`",
+    "COMMA": "join formulas by `and`; write sets with braces, `x in {a, b}`, and numbers with a decimal point",
+    "NOT": "write `!in`, `!=`, or `a and not b`",
     "SEMICOLON": "only declarations end with `;`",
     "COLON": "a formula has no `:`; a type is declared in `inputs`, `outputs` or a quantifier",
-    "THEN": "write `if F then s else t`, or `A -> B` for: if A then B",
-    "ELSE": "write `if F then s else t`, or `A -> B` for: if A then B",
     "IF": "put parentheses around it: `x == (if c then a else b)`",
 }
 """Hints by the unexpected token."""
@@ -60,7 +59,7 @@ def explain(
         expected = frozenset({"COLON"})
     if expected == {"NAME", "DEFINE"}:  # at the start of a declaration, the name is usually missing
         expected = frozenset({"NAME"})
-    hint = _hint(start, tokens, at, found, expected)
+    hint = _hint(start, tokens[:at], found, expected)
     if found.type == "$END" and tokens:
         last = tokens[-1]
         message = f"{_expected(start, expected)} is missing after `{last.text[:40]}`"
@@ -91,87 +90,53 @@ def _expected(start: str, expected: frozenset[str]) -> str:
     return ", ".join(named[:-1]) + (" or " if len(named) > 1 else "") + named[-1] if named else "nothing more"
 
 
-def _hint(start: str, tokens: Sequence[Token], at: int, found: Token, expected: frozenset[str]) -> str | None:
-    before = tokens[at - 1] if at else None
-    after = tokens[at + 1] if at + 1 < len(tokens) else None
+def _hint(start: str, earlier: Sequence[Token], found: Token, expected: frozenset[str]) -> str | None:
     keyword = about_keyword(found) if "NAME" in expected and not {"NUMBER", "ARROW"} & expected else None
-    if start == "declaration" and any(token.type == "DEFINE" for token in tokens[: at + 1]):
-        keyword = about_keyword(before) if before is not None and before.type == "DEFINE" else keyword
+    if start == "declaration" and any(token.type == "DEFINE" for token in (*earlier, found)):
+        keyword = about_keyword(earlier[-1]) if earlier and earlier[-1].type == "DEFINE" else keyword
         return f"{keyword}; {_DEFINITION}" if keyword else _DEFINITION
     if keyword and start != "topics":
         return keyword
     if start == "formula":
-        return _in_formula(tokens[:at], before, found, after, expected) or about_keyword(found)
+        return _in_formula(earlier, found, expected) or about_keyword(found)
     if start == "topics":
         return _TOPIC
     if start == "declaration":
-        if any(token.type == "EQUALS" for token in tokens[:at]):
-            formula = found.type in _COMPARISONS | _CONNECTIVES
-            return "put a formula in parentheses: `Name = (3 > 2);`" if formula else _DECLARATION
-        typed = before is not None and before.type != "COLON" and any(token.type == "COLON" for token in tokens[:at])
-        return _TYPE if typed or found.type not in ("NUMBER", "STRING", "TRUE", "FALSE", "MINUS") else _DECLARATION
-    if found.type in ("SEMICOLON", "COLON", "EQUALS") or not {"BUILTIN", "ARROW", "RBRACE"} & expected:
-        return _PORT
-    return _TYPE
+        return _TYPE if "ARROW" in expected else _DECLARATION
+    return _TYPE if {"BUILTIN", "ARROW", "RBRACE"} & expected else _PORT
 
 
-def _in_formula(
-    earlier: Sequence[Token], before: Token | None, found: Token, after: Token | None, expected: frozenset[str]
-) -> str | None:
+def _in_formula(earlier: Sequence[Token], found: Token, expected: frozenset[str]) -> str | None:
     """The hint for a token in a formula, from the most to the least specific."""
-    if before is not None and before.text in LIMITED and found.type == "NUMBER" and "NUMBER" not in expected:
-        unit = after.text if after is not None and after.text.isalpha() else "steps"
-        return f"write its limit in brackets: `{before.text}[{found.text} {unit}](F)`"
-    if before is not None and before.end < found.start and found.text and before.text + found.text in SYMBOLS:
+    before = earlier[-1] if earlier else Token("LPAR", "", found.start, found.start)
+    if before.end < found.start and found.text and before.text + found.text in SYMBOLS:
         return f"write `{before.text}{found.text}` without a space in it"
-    if expected == {"DOT"} and before is not None:
+    if expected == {"DOT"}:
         return f"`{before.text}` is a keyword; write `{before.text}.v` for the {before.text}put `v`"
     for word in (found, before):
-        if (
-            word is not None
-            and word.type in ("NAME", "IF")
-            and word.text.lower() in OPERATORS
-            and "NOT" not in expected
-        ):
-            return OPERATORS[word.text.lower()]
-    if found.type == "NOT" and after is not None and after.type in ("IN", "EQ", "EQUALS"):
-        return "write `!in`" if after.type == "IN" else "write `!=`"
-    if found.type == "NAME" and before is not None and before.type == "NUMBER":
+        if word.type in ("NAME", "IF") and word.text.lower() in WORDS and "NOT" not in expected:
+            return WORDS[word.text.lower()]
+    if before.text in LIMITED and found.type == "NUMBER":
+        return f"write its limit in brackets: `{before.text}[{found.text} steps](F)`"
+    if found.type == "NAME" and before.type == "NUMBER":
         return f"only times have units (`500 ms`): write the number in the port's own unit, without `{found.text}`"
-    if _in_quantifier(earlier, found, expected):
+    quantified = any(token.type in _QUANTIFIERS for token in earlier)
+    if quantified and (found.type in ("BAR", "IN") or "BAR" in expected or expected <= {"LPAR", "IN", "COMMA"}):
         return _QUANTIFIER
-    begins = before is None or before.type in _CONNECTIVES | {"LPAR"}
+    begins = before.type in _CONNECTIVES | {"LPAR"}
     if (begins and found.type in _COMPARISONS - {"LT"}) or ("GT" in expected and "EQ" not in expected):
         return "write both sides of each comparison: `0 < r and r < 3`, or `0 < r < 3`"
     if found.type in ("SINCE", "UNTIL") and "AND" in expected:
         return f"`{found.text}` does not chain: put parentheses around one of them"
-    if found.type in _CONNECTIVES - {"NOT", "BAR"}:
-        return f"a formula is missing before `{found.text}`"
-    if found.type == "$END" and {"THEN", "ELSE"} & expected:
-        return _IN_FORMULA["THEN"]
-    if found.type == "COMMA" and before is not None and after is not None and before.type == after.type == "NUMBER":
-        return f"write a decimal point: `{before.text}.{after.text}`"
     if found.type in _IN_FORMULA:
         return _IN_FORMULA[found.type]
-    if found.type in ("NAME", "NUMBER", "STRING", "IN", "OUT", "LPAR", "NOT", *_QUANTIFIERS):
-        if "COMMA" in expected:
-            return "separate them by commas"
-        return "join formulas by `and`, `or` or `->`" if "AND" in expected else None
-    return None
-
-
-def _in_quantifier(earlier: Sequence[Token], found: Token, expected: frozenset[str]) -> bool:
-    """Whether the variables of a quantifier, or a word that other languages use for one, are written wrongly."""
-    if found.type in ("BAR", "IN") or "BAR" in expected or expected <= {"IN", "COMMA"}:
-        return any(token.type in _QUANTIFIERS or token.text.casefold() in _LIKE for token in earlier)
-    if earlier and (earlier[-1].type in _QUANTIFIERS or earlier[-1].text.casefold() in _LIKE):
-        return True
-    if len(earlier) > 1 and earlier[-1].type == "LPAR" and earlier[-2].type in _QUANTIFIERS:
-        return found.text not in KEYWORDS
-    return found.type in _QUANTIFIERS and "AND" in expected
-
-
-_LIKE = frozenset(("forall", "all", "every", "foreach", "exists", "exist", "exists1", "some", "any", "unique", "there"))
+    if found.type in _CONNECTIVES:
+        return f"a formula is missing before `{found.text}`"
+    if {"THEN", "ELSE"} & expected:
+        return WORDS["if"]
+    if "COMMA" in expected and found.type in _TERM:
+        return "separate them by commas"
+    return "join formulas by `and`, `or` or `->`" if "AND" in expected else None
 
 
 def about_keyword(found: Token) -> str | None:

@@ -90,51 +90,29 @@ def invisible(character: str) -> str | None:
 
 
 FIELDS = "give the variable the type of that field; the plan says which field of the message it is"
-_ARITHMETIC = "RCL has `+ - * /`, `abs`, `min`, `max`, `mod`, `div`, and no other functions of numbers"
-_CONNECTIVES = "write `a and b`, `a or b`, `not a`, `a -> b`, `a <=> b`, `xor(a, b)`"
+APART = "take a tuple apart by its items, `exists(a, b in REAL | in.pair == (a, b) and …)`, or make it a record"
 
-FOREIGN_NAMES = {
-    **{word: f"write `{word.upper()}`" for word in ("true", "false")},
-    **dict.fromkeys(("always", "globally", "finally", "previously", "old", "pre", "prev", "last"), _ONE_STEP),
-    **dict.fromkeys(("fabs", "magnitude"), "write `abs(r)`"),
-    **dict.fromkeys(("sqrt", "sin", "cos", "tan", "atan2", "pow", "exp", "log", "floor", "ceil"), _ARITHMETIC),
-    **dict.fromkeys(("round", "norm", "hypot", "dist", "distance"), _ARITHMETIC),
-    **{word: f"write `{word[:3]}(a, b)`" for word in ("minimum", "maximum", "modulo")},
-    **dict.fromkeys(("remainder", "rem", "quotient"), "write `mod(n, 3)` and `div(n, 3)`"),
-    **dict.fromkeys(("len", "size", "count", "card"), "write the length of a sequence as `length(s)`"),
-    **dict.fromkeys(("range", "seq"), "write a range as `<a upto b>`, both ends included"),
-    **dict.fromkeys(("and", "or", "not", "implies", "iff"), _CONNECTIVES),
-    **{word: _QUANTIFIER.format(word) for word in ("forall", "exists")},
-    "_": "write `exists(x in REAL | c == f(x))` where any value will do",
-    **dict.fromkeys(("ite", "cond", "if"), "write `if c then a else b`"),
-    **{word: f"`{word}` is an operator only before a parenthesis: `{word}(a, b)`" for word in ("xor", "mod", "div")},
-    **{word: f"`{word}` is an operator only before a parenthesis: `{word}(…)`" for word in ("abs", "min", "max")},
-    **dict.fromkeys(("none", "null", "nullptr", "nil", "nan"), "every variable has a value of its type"),
-    **dict.fromkeys(("inf", "infinity"), "a REAL is finite"),
+_HINTS = {
+    "write `TRUE`": "true",
+    "write `FALSE`": "false",
+    _ONE_STEP: "always globally finally previously old pre prev last",
+    "RCL has `+ - * /`, `abs`, `min`, `max`, `mod`, `div`, and no other functions of numbers": "sqrt sin cos tan atan2 "
+    "pow exp log floor ceil round norm hypot dist distance fabs magnitude minimum maximum remainder quotient",
+    "write the length of a sequence as `length(s)`": "len size count card length",
+    "write a range as `<a upto b>`, both ends included": "range seq to",
+    "write `a and b`, `a or b`, `not a`, `a -> b`, `a <=> b`, `xor(a, b)`": "and or not implies then iff equiv xor",
+    "write `forall(x in S | …)` or `exists(x in S | …)`": "forall exists for all such st where with",
+    "write `x in S`, `x !in S`": "in notin nin contains has includes",
+    "write `==`, `!=`, `<`, `<=`, `>`, `>=`": "is equals eq less greater more bigger smaller",
+    "write `low <= x <= high`": "between",
+    "write `mod(a, 3)`, `div(a, 3)`": "mod modulo rem div",
+    "write `abs(a)`, `min(a, b)`, `max(a, b)`": "abs min max",
+    "write `if c then a else b`, or `A -> B` for: if A then B": "if ite cond when whenever unless otherwise elif",
+    "write `exists(x in REAL | c == f(x))` where any value will do": "_",
+    "every variable has a value of its type, and a REAL is finite": "none null nullptr nil nan inf infinity",
 }
-"""Other languages' names of values and functions, in lower case, with the text to write instead."""
-
-OPERATORS = {
-    **dict.fromkeys(("implies", "then"), "write `->`"),
-    **dict.fromkeys(("iff", "equiv"), "write `<=>`"),
-    **{word: f"write `{word}`" for word in ("and", "or", "not", "in", "forall", "exists")},
-    **dict.fromkeys(("is", "equals", "eq"), "write `==` (or `!=`, `<`, `<=`, `>`, `>=`)"),
-    **dict.fromkeys(("less", "greater", "more", "bigger", "smaller"), "write `<`, `<=`, `>` or `>=`"),
-    "xor": "write `xor(a, b)`",
-    **dict.fromkeys(("mod", "rem", "modulo"), "write `mod(a, 3)`"),
-    "div": "write `div(a, 3)`",
-    "unless": "write `not B -> A` for: A unless B",
-    "between": "write `low <= x <= high`",
-    "to": "write a range as `<a upto b>`, both ends included",
-    **dict.fromkeys(("notin", "nin"), "write `!in`"),
-    **dict.fromkeys(("such", "st", "where", "with"), "write `|` between the variables and the formula"),
-    **dict.fromkeys(("for", "all"), "write `forall(x in S | …)` or `exists(x in S | …)`"),
-    **dict.fromkeys(("contains", "has", "includes"), "write `x in S`"),
-    **dict.fromkeys(("otherwise", "elif"), "write `if c then a else b`"),
-    **dict.fromkeys(("if", "when", "whenever"), "write `A -> B` for: if A then B, `A <=> B` for: A if and only if B"),
-    "length": "write `length(s)`",
-}
-"""Words used in place of an operator, in lower case, with the text to write instead."""
+WORDS = {word: hint for hint, words in _HINTS.items() for word in words.split()}
+"""Other languages' names of values, functions and operators, in lower case, with the text to write instead."""
 
 FOREIGN_TYPES = {
     **dict.fromkeys(("string", "str", "text"), "STRING"),

@@ -300,8 +300,7 @@ def operation(name: Builtin, arguments: Sequence[Term], span: Span | None) -> Te
         case Typing.WHOLE:
             for k, argument in enumerate(arguments):
                 if not isinstance(argument.sort, WHOLE):
-                    hint = None if k else "reals have no remainder; `/` divides them"
-                    return Mistyped("RCL308", f"`{name}` is of whole numbers, and this is of type {{}}", k, hint)
+                    return Mistyped("RCL308", f"`{name}` is of whole numbers, and this is of type {{}}", k)
             dividend, divisor = arguments
             if not (isinstance(divisor, Literal) and isinstance(divisor.value, int) and divisor.value > 0):
                 hint = f"write a number that is known, as in `{name}(n, 3)`"
