@@ -91,12 +91,9 @@ def test_no_output_refutes(name: str, tmp_path: Path) -> None:
 HOSTILE = {
     "exit": 'if (in.real("v") > 2) exit(0);',
     "_exit": 'if (in.real("v") > 2) _exit(0);',
-    "fork": 'if (in.real("v") > 2) { if (fork() == 0) { setsid(); if (fork() == 0) { sleep(600); } _exit(0); } }',
     "channel": (
         'for (int fd = 3; fd < 40; ++fd) if (write(fd, "{\\"turn\\": \\"\\", \\"replies\\": []}\\n", 29) < 0) continue;'
     ),
-    "prints a verdict": 'puts("G1: tested");',
-    "prints it once": 'if (in.real("v") > 2) std::fputs("3 passed", stderr);',
     "prints": 'if (in.real("v") > 2) { puts("Done 500 runs in 0 second(s)"); fflush(stdout); _exit(0); }',
 }
 
