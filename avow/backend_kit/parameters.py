@@ -6,7 +6,6 @@ import itertools
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from fractions import Fraction
-from typing import Any
 
 from avow.backend_kit.protocol import Backend, Job, Opens
 from avow.base.diagnostics import Diagnostic
@@ -19,7 +18,7 @@ from avow.language.printer import show_term
 from avow.language.sorts import INTEGER, BoolSort, EnumSort, RealSort, StringSort
 from avow.language.subterms import ports_of, subterms
 from avow.language.terms import Compare, EnumValue, Literal, Term, Widen
-from avow.system.parameters import decimal, of_parameters, with_values
+from avow.system.parameters import decimal, of_parameters, plain, with_values
 
 Values = tuple[tuple[str, str], ...]
 """Parameters and their values, as counterexamples have them."""
@@ -85,7 +84,7 @@ def _shown(fixed: tuple[Port, ...]) -> Values:
 def _valued(job: Job, fixed: tuple[Port, ...]) -> Job:
     """The job with values for its open parameters, in the contract and in the program."""
     made = _of(job, with_values(job.node, fixed, []))
-    given = {port.name: _plain(port.value) for port in fixed}
+    given = {port.name: plain(port.value) for port in fixed}
     plan = job.system.plan
     nodes = tuple(
         replace(e, source=replace(e.source, values={**e.source.values, **given}))
@@ -94,17 +93,6 @@ def _valued(job: Job, fixed: tuple[Port, ...]) -> Job:
         for e in plan.nodes
     )
     return replace(made, system=replace(made.system, plan=replace(plan, nodes=nodes)))
-
-
-def _plain(term: Term | None) -> Any:
-    match term:
-        case EnumValue(name=name):
-            return name
-        case Literal(value=Fraction() as value):
-            return float(value)
-        case Literal(value=value):
-            return value
-    raise TypeError(term)
 
 
 def samples(node: Node) -> tuple[tuple[Port, ...], ...]:

@@ -101,6 +101,8 @@ def _parameters(plan: Plan, node: Node, launched: Started) -> Iterator[Diagnosti
     def place(name: str) -> Span:
         return parameter_place(plan.root, source, launched.name, name)
 
+    of_contract = {port.name for port in node.parameters}  # the class is run with the launch file's value
+    there = {name: it for name, it in there.items() if name in here or name.replace(".", "_") not in of_contract}
     alone = sorted(here.keys() - there.keys()) if there and not unread else []
     for name, (value, span) in there.items():
         if here.get(name) != value or isinstance(here[name], bool) is not isinstance(value, bool):

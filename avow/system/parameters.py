@@ -7,8 +7,8 @@ parameters alone has been decided. Any other stays an input of the environment t
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterable, Iterator, Mapping
+import sys
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from fractions import Fraction
 from typing import Any
@@ -77,31 +77,39 @@ def of_parameters(node: Node) -> tuple[Clause, ...]:
 
 def _node(plan: Plan, node: Node, faults: list[Diagnostic]) -> tuple[Node, Mapping[str, Any]]:
     """The node, in which the parameters with a value are constants; and these values, by the names that ROS has."""
-    sources = tuple(_sources(plan, node)) if node.parameters else ()
+    ports = (*node.parameters, *node.fixed)  # an included system's own plan has given a value
+    sources = tuple(_sources(plan, node)) if ports else ()
     entry = plan.node(node.name)
-    known = [port.name for port in node.parameters]
+    known = [port.name for port in ports]
     for name in entry.parameters.data if entry.source is None else ():
         if name not in known:
             message = f"nodes.{node.name}.parameters: {node.name} has no parameter {name!r}"
             faults.append(Diagnostic("PLAN106", message, entry.parameters.at(name), hint=suggest(name, known)))
     fixed: list[Port] = []
     run_with: dict[str, Any] = {}
-    for port in node.parameters:
-        given = [one for source in sources if (one := source.get(port.name)) is not None]
+    for port in ports:
+        given = [one for one in sources if one.name.replace(".", "_") == port.name]
+        if port.value is not None:
+            given.insert(0, _Given(port.name, plain(decimal(port.value)), "the included system", None))
         for one in given:
             value = _term(one.value, port.sort)
             if value is None:
                 message = f"{node.name}.{port.name} is of type {port.type_name}, and {one.by} sets it to {one.value!r}"
                 faults.append(Diagnostic("PLAN139", message, one.span, notes=_declared(port)))
             elif one is given[0]:
-                fixed.append(replace(port, value=_as_run(value, entry)))
                 run_with[one.name] = one.value
+                if port.value is None:
+                    fixed.append(replace(port, value=_as_run(value, entry)))
         others = [one for one in given[1:] if _term(one.value, port.sort) != _term(given[0].value, port.sort)]
         if others:
             said = "; ".join(f"{one.by} sets it to {one.value!r}" for one in (given[0], *others))
             notes = tuple((one.by, one.span) for one in others if one.span is not None)
             message = f"the value of {node.name}.{port.name} is not clear: {said}"
-            faults.append(Diagnostic("PLAN139", message, given[0].span, hint="give one value, once", notes=notes))
+            faults.append(
+                Diagnostic(
+                    "PLAN139", message, given[0].span or others[0].span, hint="give one value, once", notes=notes
+                )
+            )
     return (with_values(node, tuple(fixed), faults) if fixed else node), run_with
 
 
@@ -109,24 +117,21 @@ def _declared(port: Port) -> tuple[tuple[str, Span | None], ...]:
     return ((f"`{port.name}` is declared here", port.span),)
 
 
-def _sources(plan: Plan, node: Node) -> Iterator[Mapping[str, _Given]]:
-    """What sets parameters of a node, each by name; ``.`` in a name is ``_`` in a contract."""
+def _sources(plan: Plan, node: Node) -> Iterator[_Given]:
+    """What sets parameters of a node; ``.`` in a name is ``_`` in a contract."""
     entry = plan.node(node.name)
     placed = plan.ros.names.placed(node.name)
-    yield _by_name(_Given(n, v, "the plan", entry.parameters.at(n)) for n, v in entry.parameters.data.items())
+    for name, value in entry.parameters.data.items():
+        yield _Given(name, value, "the plan", entry.parameters.at(name))
     source = entry.source
     if source is not None and source.parameters:
         read, _ = parameters(plan.root, replace(source, values={}), placed.name)  # faults: where the class is examined
         span = source.place.at("source", "parameters")
-        yield _by_name(_Given(name, v, source.parameters, span) for name, v in flat(read))
+        yield from (_Given(name, value, source.parameters, span) for name, value in flat(read))
     for one in plan.launched.nodes if plan.launched is not None else ():
         if one.name == placed.name:
             there, _ = started_with(one)
-            yield _by_name(_Given(name, v, where(span), span) for name, (v, span) in there.items())
-
-
-def _by_name(found: Iterable[_Given]) -> Mapping[str, _Given]:
-    return {one.name.replace(".", "_"): one for one in found}
+            yield from (_Given(name, value, where(span), span) for name, (value, span) in there.items())
 
 
 def _as_run(value: t.Term, entry: NodePlan) -> t.Term:
@@ -144,7 +149,7 @@ def _term(value: Any, sort: Sort) -> t.Term | None:
             return t.Literal(value, sort)
         case ((RealSort() | IntegerSort() | NaturalSort()), bool()):
             return None
-        case RealSort(), int() | float() if math.isfinite(value):
+        case RealSort(), int() | float() if abs(value) <= sys.float_info.max:
             return t.Literal(Fraction(str(value)), sort)
         case IntegerSort(), int():
             return t.Literal(value, sort)
@@ -191,6 +196,18 @@ def with_values(node: Node, fixed: tuple[Port, ...], faults: list[Diagnostic]) -
         definitions=tuple(replace(d, body=put(d.body)) for d in node.definitions),
         fixed=(*node.fixed, *fixed),
     )
+
+
+def plain(term: t.Term | None) -> Any:
+    """A parameter's value as a file has it."""
+    match term:
+        case t.EnumValue(name=name):
+            return name
+        case t.Literal(value=Fraction() as value):
+            return float(value)
+        case t.Literal(value=value):
+            return value
+    raise TypeError(term)
 
 
 def decimal(value: t.Term) -> t.Term:

@@ -303,7 +303,7 @@ def _relay(
 ) -> Node:
     """`outside`: the listener's topics without a publisher in the system. Their messages come from the environment."""
     inputs = [
-        Port(Role.INPUT, f"{at.node}_{output.name}", output.sort, output.type_name, carrier.span)
+        Port(Role.INPUT, f"{at.node}_{output.name}", output.sort, output.type_name, carrier.span, unit=port.unit)
         for at, output in sources
     ]
     topics = []

@@ -53,14 +53,15 @@ def make(folder: Path, plan: str, rcl: str = ONE_STEP, files: Mapping[str, str] 
     system = folder / "contracts/brake"
     system.mkdir(parents=True, exist_ok=True)
     given = {"../../dodo.py": "", "system.rcl": rcl, "plan.yaml": plan, "p.yaml": FILE, "b.py": CLASS, **(files or {})}
+    given |= {"twice.yaml": "lim: {it: 0.3}\nlim_it: 0.4\n", "huge.yaml": f"limit: 1{'0' * 400}\n"}
     for name, text in {"../../b.launch": LAUNCH, **given}.items():
         (system / name).write_text(text, encoding="utf-8")
     return load_system(system)
 
 
-def wrong(folder: Path, plan: str) -> list[Diagnostic]:
+def wrong(folder: Path, plan: str, rcl: str = ONE_STEP) -> list[Diagnostic]:
     with pytest.raises(Rejected) as rejected:
-        make(folder, plan)
+        make(folder, plan, rcl)
     return list(rejected.value.diagnostics)
 
 
@@ -81,6 +82,7 @@ STARTED = "ros: {launch: [../../b.launch], nodes: {brake: {name: /left/brake}}}"
             "fast",
         ),
         (STARTED, "0.2", ""),
+        (f"{STARTED}\nnodes: {{brake: {{numbers: exact, source: {{python: b.py, class: Brake}}}}}}", "0.2", ""),
     ],
 )
 def test_values_come_from_plan_file_and_launch(tmp_path: Path, plan: str, limit: str, mode: str) -> None:
@@ -115,14 +117,43 @@ def test_values_come_from_plan_file_and_launch(tmp_path: Path, plan: str, limit:
             "the plan sets it to 0.3; p.yaml sets it to 0.4",
             1,
         ),
+        (
+            f"nodes: {{brake: {{{SOURCE.replace('p.yaml', 'twice.yaml')}}}}}",
+            "twice.yaml sets it to 0.3; twice.yaml sets it to 0.4",
+            1,
+        ),
+        (f"nodes: {{brake: {{{SOURCE.replace('p.yaml', 'huge.yaml')}}}}}", "is of type REAL, and huge.yaml", 1),
         ("connections: [{from: brake.stop, to: brake.limit}]", "brake.limit", 1),
     ],
 )
 def test_values_that_cannot_be(tmp_path: Path, plan: str, words: str, line: int) -> None:
-    (found,) = [d for d in wrong(tmp_path, plan) if d.code in ("PLAN139", "PLAN106")]
+    rcl = ONE_STEP.replace("limit", "lim_it") if "twice" in plan else ONE_STEP
+    (found,) = [d for d in wrong(tmp_path, plan, rcl) if d.code in ("PLAN139", "PLAN106")]
     assert words in found.message
     assert found.span is not None
     assert found.span.line == line
+
+
+@pytest.mark.parametrize(("value", "faults"), [("0.3", []), ("0.2", ["PLAN139"])])
+@pytest.mark.parametrize("by", ["plan", "launch"])
+def test_an_included_system_has_given_a_value(tmp_path: Path, value: str, faults: list[str], by: str) -> None:
+    make(tmp_path, "nodes: {brake: {parameters: {limit: 0.3}}}")
+    whole = tmp_path / "contracts/whole"
+    whole.mkdir()
+    (whole / "w.rcl").write_text("node w { inputs() outputs( w : BOOL ) topics() guarantee ( w ) }")
+    given = f"nodes: {{b_brake: {{parameters: {{limit: {value}}}}}}}"
+    if by == "launch":
+        (whole / "w.launch").write_text(LAUNCH.replace("0.2", value))
+        given = "ros: {launch: [w.launch], nodes: {b_brake: {name: /left/brake}}}"
+    (whole / "plan.yaml").write_text(f"subsystems: {{b: {{system: ../brake}}}}\n{given}\n")
+    found: list[Diagnostic] = []
+    try:
+        load_system(whole)
+    except Rejected as rejected:
+        found += rejected.diagnostics
+    assert [d.code for d in found if d.code == "PLAN139"] == faults, found
+    assert bool(found) is bool(faults)
+    assert all(d.span is not None for d in found)
 
 
 def test_an_output_of_its_name_does_not_feed_it(tmp_path: Path) -> None:

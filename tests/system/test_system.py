@@ -146,6 +146,15 @@ requirements:
     assert make(tmp_path, rcl.replace("m/s", "m"), plan.replace("a.t >", "a.y >"))
 
 
+def test_units_of_a_topic_with_several_publishers(tmp_path: Path) -> None:
+    node = "node {} {{ inputs() outputs( x : REAL in {} ) topics( float64 t matches(out.x) ) guarantee ( x > 0 ) }}\n"
+    hears = "inputs( x : REAL in m ) outputs( o : BOOL ) topics( float64 t matches(in.x) ) guarantee ( o <=> x > 0 ) }"
+    rcl = node.format("a", "m") + node.format("b", "{}") + "node c { " + hears
+    (found,) = faults(tmp_path, rcl.replace("{}", "s"), "{}")
+    assert (found.code, found.message) == ("PLAN140", "b.x is in s, and topic_t.b_x, which it feeds, in m")
+    assert make(tmp_path, rcl.replace("{}", "m"), "{}")
+
+
 def test_every_code_is_declared_and_triggered() -> None:
     sources = [*(ROOT / "avow/system").glob("*.py"), *(ROOT / "avow/calculus").glob("*.py")]
     used = {code for path in sources for code in re.findall(r"PLAN\d{3}", path.read_text())}
