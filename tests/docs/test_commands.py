@@ -94,6 +94,7 @@ INSTEAD = {
     "avow refines A B [--node n] [--rename new=old]": "avow refines thermostat thermostat"
     " && avow refines thermostat thermostat --node thermostat --rename mode=mode",
     "avow report --check": "avow report --check thermostat",
+    "avow report SYSTEM --format NAME": "avow report thermostat --format gsn",
     "avow review sign SYSTEM NODE --key KEY [--method ID]": f"{KEYED} && {STAMPED}"
     " && avow review sign contracts/thermostat thermometer --key my.key --method review",
     "avow review stamp SYSTEM NODE [--method ID] [--renewed DATE]": f"{STAMPED}"
