@@ -24,10 +24,11 @@ from avow.language.operators import OPERATORS
 from avow.language.printer import show_term
 from avow.language.sorts import BoolSort, EnumSort, IntegerSort, NaturalSort, RealSort, Sort, StringSort
 from avow.language.subterms import ports_of
+from avow.ros.code import read_code
 from avow.ros.parameters import flat
 from avow.system.launched import started_with, where
 from avow.system.node_plan import parameters
-from avow.system.plan import EnvironmentInput, NodePlan, Numbers, Plan
+from avow.system.plan import Driving, EnvironmentInput, NodePlan, Numbers, Plan
 
 OPEN = "the plan gives it no value: what is shown holds for each value that the contract's assumptions allow"
 KEPT = "a parameter keeps its value during a run"
@@ -41,6 +42,8 @@ class _Given:
     value: Any
     by: str
     span: Span | None
+    default: bool = False
+    """Whether any other takes precedence."""
 
 
 def with_parameters(plan: Plan, contract: Contract) -> tuple[Plan, Contract, tuple[Diagnostic, ...]]:
@@ -87,17 +90,19 @@ def _node(plan: Plan, node: Node, faults: list[Diagnostic]) -> tuple[Node, Mappi
             faults.append(Diagnostic("PLAN106", message, entry.parameters.at(name), hint=suggest(name, known)))
     fixed: list[Port] = []
     run_with: dict[str, Any] = {}
+    places: dict[str, Span | None] = {}
     for port in ports:
         given = [one for one in sources if one.name.replace(".", "_") == port.name]
         if port.value is not None:
             given.insert(0, _Given(port.name, plain(decimal(port.value)), "the included system", None))
+        given = [one for one in given if not one.default] or given
         for one in given:
             value = _term(one.value, port.sort)
             if value is None:
                 message = f"{node.name}.{port.name} is of type {port.type_name}, and {one.by} sets it to {one.value!r}"
                 faults.append(Diagnostic("PLAN139", message, one.span, notes=_declared(port)))
             elif one is given[0]:
-                run_with[one.name] = one.value
+                run_with[one.name], places[port.name] = one.value, one.span
                 if port.value is None:
                     fixed.append(replace(port, value=_as_run(value, entry)))
         others = [one for one in given[1:] if _term(one.value, port.sort) != _term(given[0].value, port.sort)]
@@ -110,7 +115,7 @@ def _node(plan: Plan, node: Node, faults: list[Diagnostic]) -> tuple[Node, Mappi
                     "PLAN139", message, given[0].span or others[0].span, hint="give one value, once", notes=notes
                 )
             )
-    return (with_values(node, tuple(fixed), faults) if fixed else node), run_with
+    return (with_values(node, tuple(fixed), faults, places) if fixed else node), run_with
 
 
 def _declared(port: Port) -> tuple[tuple[str, Span | None], ...]:
@@ -123,15 +128,20 @@ def _sources(plan: Plan, node: Node) -> Iterator[_Given]:
     placed = plan.ros.names.placed(node.name)
     for name, value in entry.parameters.data.items():
         yield _Given(name, value, "the plan", entry.parameters.at(name))
-    source = entry.source
+    source, sure = entry.source, plan.launched is None or not plan.launched.unread
     if source is not None and source.parameters:
         read, _ = parameters(plan.root, replace(source, values={}), placed.name)  # faults: where the class is examined
         span = source.place.at("source", "parameters")
         yield from (_Given(name, value, source.parameters, span) for name, value in flat(read))
     for one in plan.launched.nodes if plan.launched is not None else ():
         if one.name == placed.name:
-            there, _ = started_with(one)
+            there, unread = started_with(one)
+            sure = sure and not unread
             yield from (_Given(name, value, where(span), span) for name, (value, span) in there.items())
+    if sure and source is not None and source.kind is Driving.RCLPY:
+        declared = read_code(plan.root / source.python, source.class_name).created
+        defaults = [one for one in declared if one.side == "declares" and one.default is not None]
+        yield from (_Given(d.name, d.default, where(d.span), d.span, True) for d in defaults if d.sure)
 
 
 def _as_run(value: t.Term, entry: NodePlan) -> t.Term:
@@ -162,8 +172,11 @@ def _term(value: Any, sort: Sort) -> t.Term | None:
     return None
 
 
-def with_values(node: Node, fixed: tuple[Port, ...], faults: list[Diagnostic]) -> Node:
-    """The node with values for some parameters; those that an assumption excludes are among the faults."""
+def with_values(
+    node: Node, fixed: tuple[Port, ...], faults: list[Diagnostic], places: Mapping[str, Span | None] | None = None
+) -> Node:
+    """The node with values for some parameters; those that an assumption excludes are among the faults. `places`:
+    where each value is given."""
     values = {port.variable: port.value for port in fixed if port.value is not None}
     written = {variable: decimal(value) for variable, value in values.items()}  # an end of a range is within it
 
@@ -184,7 +197,9 @@ def with_values(node: Node, fixed: tuple[Port, ...], faults: list[Diagnostic]) -
             named = [p for p in fixed if p.variable in ports_of(old.formula)]
             said = ", ".join(f"{p.name} = {show_term(written[p.variable], 'rcl')}" for p in named)
             message = f"{node.name} is run with {said}, which its assumption {old.name} excludes"
-            faults.append(Diagnostic("PLAN139", message, old.span, hint="correct the value, or the assumption"))
+            notes = tuple((f"{p.name} gets its value here", at) for p in named if (at := (places or {}).get(p.name)))
+            hint = "correct the value, or the assumption"
+            faults.append(Diagnostic("PLAN139", message, old.span, hint=hint, notes=notes))
         if decided is not True:
             assumptions.append(new)
     names = {port.name for port in fixed}

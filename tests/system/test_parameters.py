@@ -52,9 +52,9 @@ LAUNCH = """\
 def make(folder: Path, plan: str, rcl: str = ONE_STEP, files: Mapping[str, str] | None = None) -> System:
     system = folder / "contracts/brake"
     system.mkdir(parents=True, exist_ok=True)
-    given = {"../../dodo.py": "", "system.rcl": rcl, "plan.yaml": plan, "p.yaml": FILE, "b.py": CLASS, **(files or {})}
-    given |= {"twice.yaml": "lim: {it: 0.3}\nlim_it: 0.4\n", "huge.yaml": f"limit: 1{'0' * 400}\n"}
-    for name, text in {"../../b.launch": LAUNCH, **given}.items():
+    given = {"../../dodo.py": "", "system.rcl": rcl, "plan.yaml": plan, "p.yaml": FILE, "b.py": CLASS}
+    given |= {"twice.yaml": "lim: {it: 0.3}\nlim_it: 0.4\n", "huge.yaml": f"limit: 1{'0' * 400}\n", "n.py": NODE}
+    for name, text in ({"../../b.launch": LAUNCH} | given | (files or {})).items():
         (system / name).write_text(text, encoding="utf-8")
     return load_system(system)
 
@@ -66,6 +66,12 @@ def wrong(folder: Path, plan: str, rcl: str = ONE_STEP) -> list[Diagnostic]:
 
 
 SOURCE = "source: {python: b.py, class: Brake, parameters: p.yaml}"
+NODE = """from rclpy.node import Node
+class Brake(Node):
+    def __init__(self):
+        self.declare_parameters("", [("limit", 0.3)])
+"""
+OWN = "source: {python: n.py, class: Brake, kind: rclpy}"
 STARTED = "ros: {launch: [../../b.launch], nodes: {brake: {name: /left/brake}}}"
 
 
@@ -82,6 +88,9 @@ STARTED = "ros: {launch: [../../b.launch], nodes: {brake: {name: /left/brake}}}"
             "fast",
         ),
         (STARTED, "0.2", ""),
+        (f"nodes: {{brake: {{numbers: exact, {OWN}}}}}", "0.3", ""),
+        (f"nodes: {{brake: {{numbers: exact, parameters: {{limit: 0.4}}, {OWN}}}}}", "0.4", ""),
+        (f"{STARTED}\nnodes: {{brake: {{numbers: exact, {OWN}}}}}", "0.2", ""),
         (f"{STARTED}\nnodes: {{brake: {{numbers: exact, source: {{python: b.py, class: Brake}}}}}}", "0.2", ""),
     ],
 )
@@ -154,6 +163,30 @@ def test_an_included_system_has_given_a_value(tmp_path: Path, value: str, faults
     assert [d.code for d in found if d.code == "PLAN139"] == faults, found
     assert bool(found) is bool(faults)
     assert all(d.span is not None for d in found)
+
+
+@pytest.mark.parametrize(
+    ("declared", "launch", "limit"),
+    [
+        ('"", [("limit", 0.7)]', "", "excluded"),
+        ('"", [("limit", 0.2)]', '<param name="limit" value="$(arg unknown)"/>', ""),  # it may set another
+        ('"front", [("limit", 0.2)]', "", ""),  # the parameter front.limit
+        ('"", [("limit", Parameter.Type.DOUBLE)]', "", ""),
+    ],
+)
+def test_the_default_of_a_class_is_the_last_source(tmp_path: Path, declared: str, launch: str, limit: str) -> None:
+    started = f'<launch><group ns="left"><node name="brake" pkg="p" type="b">{launch}</node></group></launch>'
+    files = {"n.py": NODE.replace('"", [("limit", 0.3)]', declared), "../../b.launch": started}
+    try:
+        (node,) = make(tmp_path, f"{STARTED}\nnodes: {{brake: {{{OWN}}}}}", files=files).contract.nodes
+        assert not limit
+    except Rejected as rejected:
+        (found,) = rejected.diagnostics
+        assert limit == "excluded"
+        assert found.code == "PLAN139"
+        assert [span.line for _, span in found.notes if span is not None] == [4]
+        return
+    assert [port.name for port in node.parameters] == ["limit", "mode"]
 
 
 def test_an_output_of_its_name_does_not_feed_it(tmp_path: Path) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import sys
+from typing import Any
 
 from avow.base.diagnostics import Span
 from avow.base.records import dataclass
@@ -23,6 +24,8 @@ class Created:
     quality: Quality = Quality()
     sure: bool = True
     """Whether it is created under no condition."""
+    default: Any = None
+    """A parameter's, if it is a literal."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import contextlib
 import math
 from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
@@ -20,8 +21,8 @@ _METHODS = {
     "create_subscription": ("subscribes", ("kind", "name", "", "quality")),
     "create_service": ("serves", ("kind", "name")),
     "create_client": ("calls", ("kind", "name")),
-    "declare_parameter": ("declares", ("name",)),
-    "declare_parameters": ("declares", ("", "every")),
+    "declare_parameter": ("declares", ("name", "value")),
+    "declare_parameters": ("declares", ("namespace", "every")),
 }
 """Methods of rclpy's Node: what they create, and the meaning of their first arguments."""
 _CALLS = {
@@ -198,11 +199,13 @@ class _Reader:
         if "every" in given:
             items = self.value(given["every"])
             pairs = items.elts if isinstance(items, ast.List | ast.Tuple) else [call]
-            names = [pair.elts[0] if isinstance(pair, ast.Tuple) and pair.elts else call for pair in pairs]
+            parts = [pair.elts if isinstance(pair, ast.Tuple) and pair.elts else [call] for pair in pairs]
         else:
-            names = [given.get("name", call)]
-        for each in names:
+            parts = [[given.get("name", call), *([given["value"]] if "value" in given else [])]]
+        for each, *more in parts:
             name = self.word(each)
+            if (prefix := given.get("namespace")) is not None and name is not None and self.word(prefix) != "":
+                name = f"{space}.{name}" if (space := self.word(prefix)) else None
             if name is None or any(isinstance(arg, ast.Starred) for arg in call.args):
                 shown = ast.unparse(each) if each is not call else "this call"
                 self.tell(call, f"the name `{shown[:60]}` is computed")
@@ -214,7 +217,10 @@ class _Reader:
             elif side == "publishes" and (latch := given.get("latch")) is not None:
                 latched = isinstance(latch, ast.Constant) and latch.value is True
                 made = Quality(durability="transient_local" if latched else None)
-            self.created.append(Created(side, name, kind, self.at(call), made, sure))
+            default = None
+            with contextlib.suppress(ValueError, TypeError, IndexError):
+                default = ast.literal_eval(self.value(more[0]))
+            self.created.append(Created(side, name, kind, self.at(call), made, sure, default))
 
     # -- values --------------------------------------------------------------------------------------------------------
 
