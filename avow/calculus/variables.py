@@ -89,8 +89,8 @@ def closest(parts: Iterable[Facts], goal: Term) -> dict[str, Term]:
 Label = TypeVar("Label")
 
 
-def bearing(facts: Mapping[Label, Term], spoken: Iterable[Variable], *, direct: bool = False) -> dict[Label, Term]:
-    """The facts that share a variable with the given ones, directly or (unless `direct`) through other facts. Other
+def bearing(facts: Mapping[Label, Term], spoken: Iterable[Variable]) -> dict[Label, Term]:
+    """The facts that share a variable with the given ones, directly or through other facts. Other
     facts cannot help a proof, and may keep the solver busy for long."""
     left = {label: free_variables(fact) for label, fact in facts.items()}
     known = set(spoken)
@@ -99,8 +99,6 @@ def bearing(facts: Mapping[Label, Term], spoken: Iterable[Variable], *, direct: 
         for label in near:
             found[label] = facts[label]
             known |= left.pop(label)
-        if direct:
-            break
     return found
 
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from avow.base.tuning.bounds import ATOMS_MADE
-from avow.formulas.traversal import Steps, run
+from avow.formulas.traversal import Steps, each, run
 from avow.language import terms as t
 from avow.language.operators import definition
 from avow.language.sorts import BOOL
@@ -36,10 +36,7 @@ def _formula(term: t.Term, left: Iterator[int]) -> Steps[t.Term]:
             cases: t.Term = yield _formula(t.And(parts, term.span), left)
             return cases
         case t.Not() | t.And() | t.Or() | t.Implies() | t.Iff() | t.Quantified():
-            made: list[t.Term] = []
-            for child in term.children:
-                part: t.Term = yield _formula(child, left)
-                made.append(part)
+            made = yield from each(_formula(child, left) for child in term.children)
             return term.rebuild(tuple(made))
         case _:  # an atom
             if next(left, None) is None:

@@ -13,7 +13,7 @@ from typing import assert_never
 
 from avow.base.remembered import by_identity
 from avow.formulas.flattening import joined
-from avow.formulas.traversal import Steps, run
+from avow.formulas.traversal import Steps, each, run
 from avow.language import sorts as s
 from avow.language import terms as t
 from avow.language.contract import Clause, Node
@@ -92,10 +92,7 @@ def substitute(term: t.Term, mapping: Mapping[t.Variable, t.Term]) -> t.Term:
                 renewed.append(renamed)
             body: t.Term = yield steps(current.body, inner)
             return t.Quantified(current.quantifier, tuple(renewed), body, current.span)
-        parts: list[t.Term] = []
-        for child in current.children:
-            part: t.Term = yield steps(child, active)
-            parts.append(part)
+        parts = yield from each(steps(child, active) for child in current.children)
         return current.rebuild(tuple(parts)) if parts else current
 
     return run(steps(term, dict(mapping)))
@@ -169,17 +166,12 @@ _FLIPPED = {">": "<", ">=": "<="}
 
 def _normal(term: t.Term, scope: Mapping[t.Variable, t.Variable], level: int) -> Steps[_Keyed]:
     if isinstance(term, t.Quantified):
-        quantified: _Keyed = yield _normal_quantified(term, scope, level)
-        return quantified
+        return (yield from _normal_quantified(term, scope, level))
     if isinstance(term, t.Variable):
         return _keyed(scope.get(term, term))
     if isinstance(term, t.And | t.Or):
-        junction: _Keyed = yield _normal_junction(term, scope, level)
-        return junction
-    parts: list[_Keyed] = []
-    for child in term.children:
-        part: _Keyed = yield _normal(child, scope, level)
-        parts.append(part)
+        return (yield from _normal_junction(term, scope, level))
+    parts = yield from each(_normal(child, scope, level) for child in term.children)
     match term:
         case t.Not():
             return _not(parts[0])
@@ -291,10 +283,7 @@ def _term_key(term: t.Term) -> str:
     """The digest of a term that is already normal."""
 
     def steps(current: t.Term) -> Steps[str]:
-        keys: list[str] = []
-        for child in current.children:
-            key: str = yield steps(child)
-            keys.append(key)
+        keys = yield from each(map(steps, current.children))
         return _hash(*_head(current), *keys)
 
     return run(steps(term))

@@ -4,7 +4,7 @@ parts."""
 from __future__ import annotations
 
 from avow.formulas.formula import conjunction, disjunction, negation
-from avow.formulas.traversal import Steps, run
+from avow.formulas.traversal import Steps, each, run
 from avow.language import terms as t
 from avow.language.operators import definition
 from avow.language.sorts import BOOL, BoolSort
@@ -23,32 +23,24 @@ def _push(term: t.Term, positive: bool) -> Steps[t.Term]:
             result: t.Term = yield _push(body, not positive)
             return result
         case t.And(items=items) | t.Or(items=items):
-            parts: list[t.Term] = []
-            for item in items:
-                part: t.Term = yield _push(item, positive)
-                parts.append(part)
+            parts = yield from each(_push(item, positive) for item in items)
             both = isinstance(term, t.And) == positive
             return conjunction(parts) if both else disjunction(parts)
         case t.Implies(left=left, right=right):
-            one: t.Term = yield _push(left, not positive)
-            other: t.Term = yield _push(right, positive)
-            return disjunction((one, other)) if positive else conjunction((one, other))
+            parts = yield from each((_push(left, not positive), _push(right, positive)))
+            return disjunction(parts) if positive else conjunction(parts)
         case t.Iff(left=left, right=right):
-            one = yield _push(left, True)
-            other = yield _push(right, positive)
-            return _iff(one, other)
+            return _iff(*(yield from each((_push(left, True), _push(right, positive)))))
         case t.Operation(sort=BoolSort()) if (defined := definition(term)) is not None:
             result = yield _push(defined, positive)
             return result
         case t.Conditional(condition=condition, then=then, otherwise=otherwise):
-            test: t.Term = yield _push(condition, True)
-            one = yield _push(then, positive)
-            other = yield _push(otherwise, positive)
+            pushed = each((_push(condition, True), _push(then, positive), _push(otherwise, positive)))
+            test, one, other = yield from pushed
             return t.Conditional(test, one, other, BOOL, term.span)
         case t.Compare(operator="==" | "!=" as operator, left=left, right=right) if left.sort == BOOL:
-            one = yield _push(left, True)
-            other = yield _push(right, positive == (operator == "=="))
-            return _iff(one, other)
+            same = positive == (operator == "==")
+            return _iff(*(yield from each((_push(left, True), _push(right, same)))))
         case t.Compare(operator="!=", left=left, right=right):
             return t.Not(t.Compare("==", left, right)) if positive else t.Compare("==", left, right)
         case t.Quantified(quantifier=quantifier, variables=variables, body=body) if positive or quantifier in _DUAL:

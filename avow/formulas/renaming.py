@@ -6,7 +6,7 @@ import dataclasses
 from collections.abc import Callable, Iterable, Mapping
 
 from avow.formulas.formula import free_variables, fresh
-from avow.formulas.traversal import Steps, run
+from avow.formulas.traversal import Steps, each, run
 from avow.language.subterms import subterms
 from avow.language.terms import Quantified, Role, Term, Variable
 
@@ -36,10 +36,7 @@ def rename_apart(term: Term, taken: Iterable[str] = ()) -> Term:
             for variable in part.variables:
                 names[variable.name] = fresh(variable.name, used)
                 used.add(names[variable.name])
-        children: list[Term] = []
-        for child in part.children:
-            changed: Term = yield steps(child, names)
-            children.append(changed)
+        children = yield from each(steps(child, names) for child in part.children)
         if isinstance(part, Quantified):
             variables = tuple(dataclasses.replace(v, name=names[v.name]) for v in part.variables)
             return dataclasses.replace(part, variables=variables, body=children[0])

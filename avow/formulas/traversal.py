@@ -6,7 +6,7 @@ function is written as a generator that *yields* its recursive calls and returns
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Iterable
 from typing import Any, TypeVar
 
 from avow.language.terms import Term
@@ -34,6 +34,14 @@ def run(steps: Steps[T]) -> T:
     return result
 
 
+def each(calls: Iterable[Steps[T]]) -> Steps[list[T]]:
+    """The results of several recursive calls, in order: ``found = yield from each(…)``."""
+    found: list[T] = []
+    for call in calls:
+        found.append((yield call))
+    return found
+
+
 def depth(term: Term) -> int:
     """Levels of nesting; an atom has 1."""
     deepest = 0
@@ -52,10 +60,7 @@ def transform(term: Term, function: Callable[[Term], Term]) -> Term:
     """
 
     def steps(current: Term) -> Steps[Term]:
-        parts: list[Term] = []
-        for child in current.children:
-            part: Term = yield steps(child)
-            parts.append(part)
+        parts = yield from each(map(steps, current.children))
         return function(current.rebuild(tuple(parts)) if parts else current)
 
     return run(steps(term))

@@ -201,9 +201,8 @@ class Declarations:
                 tuple(EnumValue(m, sort) for m in sort.members), s.SetSort(sort), span
             )
             return
-        if isinstance(value, syntax.SetDisplay):
-            self.half_known(value, fresh, declared.reports)
         term = Checker(Scope(environment), declared.reports).term(value)
+        environment.broken.update(tree.text for tree in fresh)
         if term is not None and not self.is_small(name, term_extent(term), declared.name, declared.reports):
             return
         if term is not None and any(isinstance(part, Quantified) for part in subterms(term)):
@@ -214,18 +213,6 @@ class Declarations:
             environment.broken.add(name)
         else:
             environment.constants[name] = term
-
-    def half_known(self, value: syntax.SetDisplay, fresh: Sequence[syntax.Name], reports: Reports) -> None:
-        """Reports the new names of a set that also has known ones: a set either declares its elements or lists known
-        values."""
-        new = {t.start for t in fresh}
-        known = [t for t in value.items if t.start not in new]
-        for tree in fresh if known else ():
-            first = " ".join(reports.source.text[known[0].start : known[0].end].split())[:40]
-            message = f"the name `{tree.text}` is not declared"
-            hint = f"a set of new names declares them; with `{first}` in it, it is a set of known values"
-            reports.error("RCL201", message, tree.start, tree.end, hint=hint)
-            self.environment.broken.add(tree.text)
 
     def fresh_names(self, trees: Sequence[syntax.TermSyntax]) -> list[syntax.Name]:
         """The trees that are undeclared names."""

@@ -1,16 +1,16 @@
 """The table of operators: the notation, precedence, typing and meaning of each.
 
 Every pass reads its column here: printers, the checker, evaluation, the translation to Z3 (whose printing is our
-SMT-LIB), Dafny, RML, and programs proved by Hoare triples. An entry has every column or a `Why`; a missing one is an
-error at import. Forms that are structure and not operators (quantifiers, application, membership, tuples, sequences)
-are handled by a `match` with `assert_never` in each pass.
+SMT-LIB), Dafny, RML, and programs proved by Hoare triples. An entry has every column or a `Why`. Forms that are
+structure and not operators (quantifiers, application, membership, tuples, sequences) are handled by a `match` with
+`assert_never` in each pass.
 """
 
 from __future__ import annotations
 
 import operator
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import fields, replace
+from dataclasses import replace
 from enum import IntEnum, StrEnum
 from fractions import Fraction
 from functools import reduce
@@ -223,20 +223,6 @@ _ROWS = (
 # Division and remainder are Euclid's, as in SMT-LIB and Dafny: with a positive divisor that is Python's floor division.
 
 OPERATORS: Mapping[str, Operator] = {row.name: row for row in _ROWS}
-
-
-def _complete() -> None:
-    """Raises TypeError if an operator of the terms has no row, or a row an empty column."""
-    missing = [name for name in Builtin if name not in OPERATORS]
-    empty = [f"{row.name}: {f.name}" for row in _ROWS for f in fields(row) if getattr(row, f.name) in ("", None)]
-    twice = len(OPERATORS) != len(_ROWS)
-    if missing or empty or twice:
-        raise TypeError(
-            f"the table of operators is not whole: {missing} {empty}{' an operator twice' if twice else ''}"
-        )
-
-
-_complete()
 
 
 def definition(term: Operation) -> Term | None:

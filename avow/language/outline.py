@@ -185,7 +185,8 @@ class _OutlineReader:
             self.skip_to_top()
             return None
         part = self.tokens[first : self.at]
-        tree = parse("declaration", part, self.reports, part[-1].end, self.tokens[first - 1].end if first else 0)
+        begin = self.tokens[first - 1].end if first else 0
+        tree: Declaration | None = parse("declaration", part, self.reports, part[-1].end, begin)
         self.out.parts.append((part[0].start, part[-1].end))
         if tree is None:
             broken.update(t.text for t in part if t.type == "NAME")

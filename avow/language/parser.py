@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any, Literal, TypeVar, overload
+from typing import Any, Literal, TypeVar, get_args
 
 from avow.base.grammars import lark_of
 from avow.base.tuning.sizes import NESTING
@@ -21,38 +21,13 @@ from avow.language.source import Reports
 from avow.language.terms import Quantifier
 
 QUANTIFIERS = {"FORALL": Quantifier.FORALL, "EXISTS": Quantifier.EXISTS, "UNIQUE": Quantifier.UNIQUE}
-STARTS = ("declaration", "ports", "given", "topics", "formula")
+Start = Literal["declaration", "ports", "given", "topics", "formula"]
 
 
-@overload
-def parse(
-    start: Literal["declaration"], tokens: Sequence[Token], reports: Reports, end: int, begin: int | None = None
-) -> syntax.Declaration | None: ...
-
-
-@overload
-def parse(
-    start: Literal["ports", "given"], tokens: Sequence[Token], reports: Reports, end: int, begin: int | None = None
-) -> syntax.PortList | None: ...
-
-
-@overload
-def parse(
-    start: Literal["topics"], tokens: Sequence[Token], reports: Reports, end: int, begin: int | None = None
-) -> syntax.TopicList | None: ...
-
-
-@overload
-def parse(
-    start: Literal["formula"], tokens: Sequence[Token], reports: Reports, end: int, begin: int | None = None
-) -> syntax.TermSyntax | None: ...
-
-
-def parse(
-    start: str, tokens: Sequence[Token], reports: Reports, end: int, begin: int | None = None
-) -> syntax.Syntax | None:
-    """The tree of one part of a file, between the offsets `begin` (by default its first token's) and `end`. Returns
-    None after an error, and reports the first unless it follows from text that the lexer skipped or guessed."""
+def parse(start: Start, tokens: Sequence[Token], reports: Reports, end: int, begin: int | None = None) -> Any:
+    """The tree of one part of a file (a declaration, a list of ports or topics, a formula), between the offsets `begin`
+    (by default its first token's) and `end`. Returns None after an error, and reports the first unless it follows from
+    text that the lexer skipped or guessed."""
     from lark.exceptions import UnexpectedToken  # Lark takes long to import, and most runs parse nothing
 
     if start == "topics":
@@ -82,8 +57,7 @@ def parse(
             hint="split the clause, or name its parts",
         )
         return None
-    found: syntax.Syntax = tree
-    return found
+    return tree
 
 
 def _accepted(start: str, tokens: Iterable[Token]) -> frozenset[str]:
@@ -100,7 +74,9 @@ def _callbacks() -> SimpleNamespace:
 
 
 def _lark() -> Any:
-    return lark_of(Path(__file__).with_name("grammar.lark"), "rcl", STARTS, _callbacks, maybe_placeholders=False)
+    return lark_of(
+        Path(__file__).with_name("grammar.lark"), "rcl", get_args(Start), _callbacks, maybe_placeholders=False
+    )
 
 
 _Made = TypeVar("_Made")

@@ -17,33 +17,21 @@ from dataclasses import dataclass
 from avow.base.codec import canonical, from_text, to_json
 from avow.base.process import die_with, kill_tree, unwatch, watch
 from avow.base.tuning.running import NODES_REMEMBERED, SANITY_LINE
+from avow.base.verdict import Verdict
 from avow.language.contract import Contract, Node
 from avow.language.load import check_in_part, sound_nodes
 from avow.language.source import Source
 from avow.lsp.names import taken_apart
 from avow.sanity.claims import node_key
+from avow.sanity.document import Result, to_document
 
 _NEUTRAL = "/"
 """Its working directory: nothing of a workspace is found from there."""
 
 
-@dataclass(frozen=True, slots=True)
-class Answer:
-    """The result of one sanity claim. `subject` is the clause or output that it is about, if it is about one."""
-
-    name: str
-    subject: str
-    claim: str
-    verdict: str
-    severity: str
-    explanation: str
-    example: str
-    because: str
-
-    @property
-    def is_bad(self) -> bool:
-        """Whether it is refuted or broken, and not merely a consequence of another."""
-        return self.verdict in ("refuted", "error") and not self.because
+def is_bad(answer: Result) -> bool:
+    """Whether a claim is refuted or broken, and not merely a consequence of another."""
+    return answer.verdict in (Verdict.REFUTED, Verdict.ERROR) and not answer.because
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,12 +52,12 @@ class Asked:
 
     def __init__(self, told: Callable[[], None]) -> None:
         self.told = told
-        self.answers: dict[str, tuple[Answer, ...]] = {}
+        self.answers: dict[str, tuple[Result, ...]] = {}
         self.wanted: frozenset[str] = frozenset()
         """The keys of the nodes that are being evaluated."""
         self.task: asyncio.Task[None] | None = None
 
-    def about(self, node: Node, clause: str | None) -> tuple[Answer, ...]:
+    def about(self, node: Node, clause: str | None) -> tuple[Result, ...]:
         """The known answers for a clause of a node, or (None) for the node and its outputs; none until computed."""
         others = {each.name for each in node.clauses}
         found = self.answers.get(_key(node), ())
@@ -119,7 +107,7 @@ class Asked:
             process.stdin.write(canonical(to_json(wanted)).encode())
             process.stdin.close()
             while line := await process.stdout.readline():
-                key, answers = from_text(tuple[str, tuple[Answer, ...]], line)
+                key, answers = from_text(tuple[str, tuple[Result, ...]], line)
                 self.answers[key] = answers
                 while len(self.answers) > NODES_REMEMBERED:
                     del self.answers[next(iter(self.answers))]
@@ -149,19 +137,7 @@ def main(parent: int) -> None:
         key = _key(node)
         if key not in wanted.nodes:
             continue
-        answers = tuple(
-            Answer(
-                result.name,
-                result.asked.subject or "",
-                result.asked.sentence,
-                str(result.verdict),
-                str(result.asked.severity),
-                result.explanation,
-                result.counterexample.text() if result.counterexample is not None else "",
-                result.because or "",
-            )
-            for result in analyse(node)
-        )
+        answers = tuple(map(to_document, analyse(node)))
         print(canonical(to_json((key, answers))), flush=True)
 
 

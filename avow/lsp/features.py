@@ -18,15 +18,15 @@ from avow.language.scope import of_contract
 from avow.language.source import Source
 from avow.language.subterms import subterms
 from avow.language.terms import Quantified, Variable
-from avow.lsp.background import Answer
 from avow.lsp.names import CLAUSES, Meaning, Occurrence, Text, What, at_offset, taken_apart
 from avow.lsp.project import Project, about_plan, is_plan, project_of
 from avow.lsp.renaming import all_occurrences
 from avow.lsp.vocabulary import BUILTIN_TYPES, FORMS
+from avow.sanity.document import Result
 
 StatusLookup = Callable[[str, str], str | None]
 """(node, clause) → its status in the ledger, in a few words; None if it has none."""
-SanityLookup = Callable[[Node, str | None], tuple[Answer, ...]]
+SanityLookup = Callable[[Node, str | None], tuple[Result, ...]]
 """The known answers about the sanity of a node's clause, or (None) of the node and its outputs."""
 
 

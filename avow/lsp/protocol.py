@@ -13,10 +13,10 @@ from avow.language.contract import ClauseKind
 from avow.language.source import Source
 from avow.language.syntax import ConstantDeclaration, Declaration, Define, TypeDeclaration
 from avow.lsp.appearance import MODIFIERS, TOKEN_TYPES, Coloured
-from avow.lsp.background import Answer
 from avow.lsp.completion import Offer, Signature
 from avow.lsp.features import Document
 from avow.lsp.names import clause_names
+from avow.sanity.document import Result
 
 SEVERITIES = {
     Severity.ERROR: types.DiagnosticSeverity.Error,
@@ -95,11 +95,11 @@ def diagnostic(found: Diagnostic, document: Document, lines: Lines) -> types.Dia
     )
 
 
-def refuted(answer: Answer, place: types.Range) -> types.Diagnostic:
+def refuted(answer: Result, place: types.Range) -> types.Diagnostic:
     """A sanity claim that does not hold, at its clause or node."""
     severity = types.DiagnosticSeverity.Error if answer.severity == "error" else types.DiagnosticSeverity.Warning
     said = [f"{answer.name} is {answer.verdict}: {answer.explanation or answer.claim}"]
-    said += [answer.example] if answer.example else []
+    said += [answer.counterexample.text] if answer.counterexample else []
     return types.Diagnostic(place, "\n".join(said), severity=severity, code=answer.name, source="avow sanity")
 
 

@@ -20,7 +20,7 @@ from avow.language.format import format_text
 from avow.language.load import check_in_part, clean_text
 from avow.lsp import features, protocol
 from avow.lsp.appearance import coloured, folds
-from avow.lsp.background import Answer, Asked, askable
+from avow.lsp.background import Asked, askable, is_bad
 from avow.lsp.completion import offers, signature
 from avow.lsp.features import Document, StatusLookup
 from avow.lsp.names import CLAUSES, Occurrence, What
@@ -30,6 +30,7 @@ from avow.lsp.project import faults_of_plan, file_of, is_plan
 from avow.lsp.protocol import Lines
 from avow.lsp.quick_fixes import fixes
 from avow.lsp.renaming import Edit, Refused, elsewhere, is_renameable, rename
+from avow.sanity.document import Result
 
 
 def _nothing(file: str) -> StatusLookup:
@@ -139,7 +140,7 @@ class Server:
         if workspace is not None and workspace.inlay_hint is not None and workspace.inlay_hint.refresh_support:
             self.server.workspace_inlay_hint_refresh(None)
 
-    def sane(self, document: Document) -> Iterator[tuple[Occurrence, tuple[Answer, ...]]]:
+    def sane(self, document: Document) -> Iterator[tuple[Occurrence, tuple[Result, ...]]]:
         """The known answers about each node and clause of a document, at its name."""
         nodes = {node.name: node for node in askable(document.project.sources, document.project.contract)}
         for name in document.names:
@@ -159,7 +160,7 @@ class Server:
         found = [protocol.diagnostic(d, document, lines) for d in document.diagnostics]
         for name, answered in self.sane(document):
             place = lines.range(name.start, name.end)
-            found += [protocol.refuted(a, place) for a in answered if a.is_bad and a.severity != "note"]
+            found += [protocol.refuted(a, place) for a in answered if is_bad(a) and a.severity != "note"]
         self.server.text_document_publish_diagnostics(types.PublishDiagnosticsParams(uri=uri, diagnostics=found))
 
     def inlay_hints(self, document: Document, lines: Lines, params: types.InlayHintParams) -> list[types.InlayHint]:
@@ -299,12 +300,12 @@ class Server:
         return [types.TextEdit(whole, formatted)] if formatted != document.text else []
 
 
-def _mark(answered: Sequence[Answer]) -> str:
+def _mark(answered: Sequence[Result]) -> str:
     """The text of a hint: the claims that do not hold, or are open, by name; otherwise that all hold.
 
     Notes are only in its tooltip.
     """
-    bad = [a.name for a in answered if a.is_bad and a.severity != "note"]
+    bad = [a.name for a in answered if is_bad(a) and a.severity != "note"]
     unsettled = [a.name for a in answered if a.verdict == "unknown"]
     if bad:
         return f"✗ {', '.join(bad)}"

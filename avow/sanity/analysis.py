@@ -31,7 +31,7 @@ from avow.sanity.conflicts import conflicts, contradictions
 from avow.sanity.over_runs import OverRuns
 from avow.sanity.realizability import possible, realizable
 from avow.sanity.results import CUT_SHORT, Bounds, Finding, Patience, SanityResult, as_outcome, listing, never_demanded
-from avow.sanity.witness_search import Group, Realizability, groups
+from avow.sanity.witness_search import Formulas, Group, Realizability, groups
 from avow.solving.limits import spent
 from avow.solving.questions import solve
 from avow.solving.second import CONTRADICTED, doubted
@@ -190,23 +190,10 @@ class _Analysis:
             return self.answer
         start = spent()
 
-        def ask(
-            assumptions: Mapping[str, Term], guarantees: Mapping[str, Term], given: Given | None = None
-        ) -> Realizability:
-            limit = 2 * self.patience.effort(serious=True)
-            return realizable(
-                self.inputs,
-                self.outputs,
-                assumptions,
-                guarantees,
-                given=given,
-                effort=limit,
-                seed=self.seed,
-            )
-
-        answer, bounded = ask(self.assumptions, self.guarantees), False
+        limit = 2 * self.patience.effort(serious=True)
+        answer, bounded = self._ask(self.assumptions, self.guarantees, limit), False
         if answer.verdict is Verdict.UNKNOWN and self.scenario:
-            within = ask(self.assumptions, self.guarantees, self.scenario)
+            within = self._ask(self.assumptions, self.guarantees, limit, given=self.scenario)
             if within.verdict is not Verdict.UNKNOWN:
                 answer, bounded = within, within.verdict is Verdict.PROVED
         if answer.verdict is Verdict.UNKNOWN and self.ranges:
@@ -214,7 +201,7 @@ class _Analysis:
             free = [v for v in self.inputs if v not in self.scenario]
             wanted = {label: self.ranges.within(f) for label, f in self.guarantees.items()}
             assumed |= self.ranges.assumptions(free)
-            within = ask(assumed, wanted, self.scenario)
+            within = self._ask(assumed, wanted, limit, given=self.scenario)
             if within.verdict is Verdict.PROVED and self._some(
                 assumed
             ):  # a refutation need not be one where quantifiers range over everything
@@ -323,15 +310,7 @@ class _Analysis:
             return unused
         # Only the inputs that it rules out matter: it is not needed if each of them has an output.
         outside = {label: negation(f) if label == name else f for label, f in self.assumptions.items()}
-        answer = realizable(
-            self.inputs,
-            self.outputs,
-            outside,
-            self.guarantees,
-            effort=2 * self.limit,
-            seed=self.seed,
-            doubtful=True,
-        )
+        answer = self._ask(outside, self.guarantees, 2 * self.limit, doubtful=True)
         match answer.verdict:
             case Verdict.REFUTED:
                 return Finding(Verdict.PROVED, engine=answer.engine)
@@ -389,6 +368,12 @@ class _Analysis:
         return Finding(Verdict.UNKNOWN, answer.reason, engine=answer.engine)
 
     # -- asking --------------------------------------------------------------------------------------------------------
+
+    def _ask(
+        self, assumed: Formulas, wanted: Formulas, effort: int, *, given: Given | None = None, doubtful: bool = False
+    ) -> Realizability:
+        about = self.inputs, self.outputs, assumed, wanted
+        return realizable(*about, given=given, effort=effort, seed=self.seed, doubtful=doubtful)
 
     def _attempts(self) -> tuple[Given, ...]:
         """First without the scenario: an answer without it is stronger."""

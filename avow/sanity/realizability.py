@@ -14,13 +14,14 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 from avow.base.tuning.effort import CONFIRMING_EFFORT, REALIZABLE_SHARE
 from avow.base.verdict import Verdict
 from avow.formulas.formula import conjunction, free_variables, substitute
 from avow.formulas.pointwise import pointwise
-from avow.formulas.sequences import flatten
-from avow.formulas.tuples import untupled
+from avow.formulas.sequences import Flat, flatten
+from avow.formulas.tuples import Untupled, untupled
 from avow.language.definedness import defined
 from avow.language.sorts import SequenceSort
 from avow.language.terms import Apply, Quantified, Quantifier, Role, Term, Variable
@@ -66,9 +67,14 @@ def realizable(
     doubtful: bool = False,
 ) -> Realizability:
     """Decides the `Question`."""
-    asked = Question(tuple(inputs), tuple(outputs), assumptions, guarantees, given or {}, effort, seed, doubtful)
-    end = spent() + effort
-    with budget(effort * REALIZABLE_SHARE):
+    return _decided(
+        Question(tuple(inputs), tuple(outputs), assumptions, guarantees, given or {}, effort, seed, doubtful)
+    )
+
+
+def _decided(asked: Question) -> Realizability:
+    end = spent() + asked.effort
+    with budget(asked.effort * REALIZABLE_SHARE):
         for method in (_with_items, _with_functions):
             answer = method(asked)
             if answer is not None:
@@ -168,16 +174,7 @@ def _with_items(asked: Question) -> Realizability | None:
     if apart is None:
         return None
     assumed, wanted = _halves(apart.formulas)
-    answer = realizable(
-        apart.variables(asked.inputs),
-        apart.variables(asked.outputs),
-        assumed,
-        wanted,
-        given=asked.given,
-        effort=asked.effort // 2,
-        seed=asked.seed,
-        doubtful=asked.doubtful,
-    )
+    answer = _decided(_changed(asked, apart, assumed, wanted))
     match answer.verdict:
         case Verdict.PROVED:
             whole = replace(
@@ -212,15 +209,7 @@ def _with_functions(asked: Question) -> Realizability | None:
     if flat is None:
         return None
     assumed, wanted = _halves(flat.formulas)
-    changed = replace(
-        asked,
-        inputs=flat.variables(inputs),
-        outputs=flat.variables(outputs),
-        assumptions=assumed,
-        guarantees=wanted,
-        effort=asked.effort // 2,
-    )
-    answer = _grouped(changed)
+    answer = _grouped(_changed(asked, flat, assumed, wanted))
     if answer.verdict is Verdict.REFUTED:
         values = flat.values(answer.inputs)
         at = None if values is None else {v: values[v] for v in inputs if v in values}
@@ -230,6 +219,13 @@ def _with_functions(asked: Question) -> Realizability | None:
         return None
     shown, supposed = ({k: flat.restored(f) for k, f in formulas.items()} for formulas in (wanted, assumed))
     return answer if _same(asked, supposed, shown) else None
+
+
+def _changed(asked: Question, by: Untupled | Flat[Any], assumed: Formulas, wanted: Formulas) -> Question:
+    """The question over other variables, with half the effort."""
+    inputs, outputs = by.variables(asked.inputs), by.variables(asked.outputs)
+    half = asked.effort // 2
+    return replace(asked, inputs=inputs, outputs=outputs, assumptions=assumed, guarantees=wanted, effort=half)
 
 
 def _halves(formulas: Mapping[tuple[bool, str], Term]) -> tuple[dict[str, Term], dict[str, Term]]:

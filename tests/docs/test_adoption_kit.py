@@ -20,6 +20,7 @@ from helpers import avow, warehouse_bag
 
 from avow.language import textmate
 from avow.language.lexer import KEYWORDS
+from avow.language.terms import Builtin, Past
 from avow.lsp.vocabulary import FORMS
 
 ROOT = Path(__file__).parents[2]
@@ -251,6 +252,7 @@ def test_the_editors_colours_are_made_from_the_language() -> None:
 
     for word in KEYWORDS:
         assert kind(word), word
+    assert FORMS.keys() >= {*Builtin, *Past}
     for form in FORMS.values():
         assert kind(f"{form.name}(x)"), form
     for sign in ("->", "<=>", "==", "!=", "<=", "-->", "+"):
