@@ -162,20 +162,6 @@ class _OpenTable(Mapping[Point, Value]):
     def __len__(self) -> int:
         return len(self._all())
 
-    def items(self) -> Any:
-        return self._all().items()
-
-    def keys(self) -> Any:
-        return self._all().keys()
-
-    def values(self) -> Any:
-        return self._all().values()
-
-    def __eq__(self, other: object) -> bool:
-        return self._all() == other
-
-    __hash__ = None  # type: ignore[assignment]
-
 
 class _OpenItems(Sequence[Value]):
     """The elements of a sequence of known length, some of them open."""

@@ -1,12 +1,11 @@
 """Derivations as the paper writes them: premises, linking equations, side conditions, a line, the conclusion.
 
-One structure (`Lines`) is printed as text, as an HTML fragment and as LaTeX, so that these cannot differ. Names come
-from contracts; each printer escapes them.
+One structure (`Lines`) is printed as text and as LaTeX, so that these cannot differ. Names come from contracts, and the
+LaTeX printer escapes them.
 """
 
 from __future__ import annotations
 
-import html
 from collections.abc import Iterator, Mapping
 
 from avow.base.records import dataclass
@@ -83,7 +82,6 @@ class Written:
     name: str
     rule: str
     text: str
-    html: str
     latex: str
     conclusion: str
     premises: tuple[str, ...]
@@ -117,7 +115,6 @@ def write_goal(goal: Goal, settled: Mapping[SideCondition, Settled] | None = Non
         goal.name,
         goal.root.rule.value,
         "\n\n".join([*map(_as_text, written), *_joined(goal.contract)]),
-        "\n".join([*map(as_html, written), *(f"<pre>{html.escape(line)}</pre>" for line in _joined(goal.contract))]),
         "\n\n".join(map(as_latex, written)),
         _plain(conclusion.parts),
         tuple(dict.fromkeys(node for part in goal.root.walk() if part.rule is Rule.PREMISE for node in part.nodes)),
@@ -275,23 +272,6 @@ def _as_text(lines: Lines) -> str:
     return "\n".join([title, *above, "─" * width, *below, *provided])
 
 
-def as_html(lines: Lines) -> str:
-    """An HTML fragment; everything escaped."""
-
-    def shown(line: Line) -> str:
-        remark = f' <span class="remark">{html.escape(line.remark)}</span>' if line.remark else ""
-        return f"<div>{''.join(map(_html_part, line.parts))}{remark}</div>"
-
-    title = html.escape(f"{lines.rule} ({lines.name})" if lines.name else lines.rule)
-    provided = "".join(f"<div>provided that {html.escape(text)}</div>" for text in lines.hypotheses)
-    return (
-        f'<div class="rule"><div class="rule-name">{title}</div>'
-        f'<div class="premises">{"".join(map(shown, lines.above))}</div><hr/>'
-        f'<div class="conclusion">{"".join(map(shown, lines.below))}</div>'
-        f'<div class="hypotheses">{provided}</div></div>'
-    )
-
-
 def as_latex(lines: Lines) -> str:
     """An array as in the paper; needs `amsmath` and `amssymb`."""
 
@@ -306,16 +286,6 @@ def as_latex(lines: Lines) -> str:
     provided = [rf"\text{{\footnotesize provided that {latex_escape(text)}}} \\" for text in lines.hypotheses]
     array = "\n".join([r"\begin{array}{l}", *body, *provided, r"\end{array}"])
     return f"\\textbf{{{title}}}\n\\[\n{array}\n\\]"
-
-
-def _html_part(part: Part) -> str:
-    if not isinstance(part, Symbol):
-        return html.escape(f" {part} " if part in _SPACED or part in ("⊢", "·") else part)
-    if part.node == "…":
-        return "…"
-    letter = f"<i>{part.kind}</i>" if part.kind in ("i", "o") else _KINDS[part.kind]
-    over = f'<span style="text-decoration:overline">{letter}</span>' if part.kind in ("i", "o") else letter
-    return f"{over}<sub>{html.escape(part.node)}</sub>"
 
 
 def _latex_part(part: Part) -> str:

@@ -59,8 +59,7 @@ class Histories(Terms):
             self.error("RCL322", f"`{operator}` speaks of other steps than this one, and there is one here only", tree)
             return None
         if operator is Past.STEPS:
-            hint = "write `steps(every 20 ms)` or `steps(at most 100 ms)`"
-            self.error("RCL324", f"`{self.text(tree)}` says nothing of how far apart steps are", tree, hint=hint)
+            self.no_pace(tree)
             return None
         if operator in RESPONSES and self.response is not tree:
             self.error("RCL321", f"`{operator}` is a response, and does not stand here: {_PLACE}", tree)
@@ -86,8 +85,7 @@ class Histories(Terms):
         scale = _scale(tree.length.unit.text)
         head = syntax.unparenthesised(tree.head)
         if not isinstance(head, syntax.Name) or head.text != Past.STEPS or relation is None:
-            hint = "write `steps(every 20 ms)` or `steps(at most 100 ms)`"
-            self.error("RCL324", f"`{self.text(tree)}` says nothing of how far apart steps are", tree, hint=hint)
+            self.no_pace(tree)
             return None
         if scale is None or Fraction(tree.length.digits) == 0:
             hint = f"units of time are {', '.join((*UNITS, *LONG_UNITS))}"
@@ -98,6 +96,10 @@ class Histories(Terms):
             return None
         amount = Literal(Fraction(tree.length.digits) * scale, REAL, self.span(tree.length))
         return History(Past.STEPS, (), BOOL, Limit(relation, amount, False), self.span(tree))
+
+    def no_pace(self, tree: syntax.TermSyntax) -> None:
+        hint = "write `steps(every 20 ms)` or `steps(at most 100 ms)`"
+        self.error("RCL324", f"`{self.text(tree)}` says nothing of how far apart steps are", tree, hint=hint)
 
     def _limits(self, tree: syntax.TermSyntax, operator: Past, limit: syntax.LimitSyntax | None) -> bool:
         """Whether the operator has a limit if it needs one, and one of the right kind; reports it if not."""
@@ -183,11 +185,7 @@ class Histories(Terms):
             amount = syntax.Number(inner.start, inner.unit.start, 1, inner.digits)
         if unit in STEPS:
             term = self.term(amount)
-            if term is None:
-                return None
-            if not isinstance(term.sort, WHOLE):
-                message = f"a number of steps is a whole number, and this is of type {show_sort(term.sort)}"
-                self.error("RCL303", message, amount)
+            if term is None or not self.has_sort(amount, term, WHOLE, "RCL303", "a number of steps is a whole number"):
                 return None
             return self._constant(tree, term, True)
         if inner.start in self.reports.odd:

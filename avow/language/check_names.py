@@ -93,6 +93,16 @@ class Names(ABC):
             self.error("RCL303", message, tree, notes=self.declared(term))
         return converted
 
+    def has_sort(
+        self, tree: TermSyntax, term: Term, kinds: type | tuple[type, ...], code: str, what: str, hint: str = ""
+    ) -> bool:
+        """Whether a term has a sort of one of these kinds; reports it if not."""
+        if isinstance(term.sort, kinds):
+            return True
+        message = f"{what}, and this is of type {show_sort(term.sort)}"
+        self.error(code, message, tree, hint=hint or None, notes=self.declared(term))
+        return False
+
     # --- literals ----------------------------------------------------------------------------------------------------
 
     def number(self, tree: Number, span: Span, sign: int = 1) -> Term:

@@ -94,31 +94,26 @@ class Terms(Names):
     def index(
         self, tree: syntax.Syntax, sequence: t.Term, arguments: Sequence[syntax.TermSyntax], item: s.Sort
     ) -> t.Term | None:
-        made = self.terms(arguments)
-        if len(made) != 1:
-            self.error("RCL305", f"a sequence takes one position and is given {len(made) or 'none'}", tree)
-            return None
-        index = made[0]
-        if index is None:
-            return None
-        if not isinstance(index.sort, WHOLE):
-            message = f"a position in a sequence is a whole number, and this is of type {show_sort(index.sort)}"
-            self.error("RCL303", message, arguments[0])
+        index = self.only(tree, arguments, "a sequence takes one position")
+        if index is None or not self.has_sort(
+            arguments[0], index, WHOLE, "RCL303", "a position in a sequence is a whole number"
+        ):
             return None
         return t.Index(sequence, index, item, self.span(tree))
 
     def length(self, tree: syntax.Syntax, arguments: Sequence[syntax.TermSyntax]) -> t.Term | None:
+        made = self.only(tree, arguments, "`length` takes one sequence")
+        if made is None or not self.has_sort(arguments[0], made, s.SequenceSort, "RCL303", "`length` is of a sequence"):
+            return None
+        return t.Length(made, s.NATURAL, self.span(tree))
+
+    def only(self, tree: syntax.Syntax, arguments: Sequence[syntax.TermSyntax], takes: str) -> t.Term | None:
+        """The argument of what takes one; another number of arguments is reported."""
         made = self.terms(arguments)
-        if len(made) != 1:
-            self.error("RCL305", f"`length` takes one sequence and is given {len(made) or 'none'}", tree)
-            return None
-        if made[0] is None:
-            return None
-        if not isinstance(made[0].sort, s.SequenceSort):
-            message = f"`length` is of a sequence, and this is of type {show_sort(made[0].sort)}"
-            self.error("RCL303", message, arguments[0])
-            return None
-        return t.Length(made[0], s.NATURAL, self.span(tree))
+        if len(made) == 1:
+            return made[0]
+        self.error("RCL305", f"{takes} and is given {len(made) or 'none'}", tree)
+        return None
 
     def indices(self, tree: syntax.Application, arguments: Sequence[syntax.TermSyntax]) -> t.Term | None:
         """``indices(s)`` is ``<0 upto length(s) - 1>``."""
@@ -185,9 +180,7 @@ class Terms(Names):
         if low is None or high is None:
             return None
         for part, term in ((tree.low, low), (tree.high, high)):
-            if not isinstance(term.sort, WHOLE):
-                message = f"a range goes over whole numbers, and this is of type {show_sort(term.sort)}"
-                self.error("RCL303", message, part)
+            if not self.has_sort(part, term, WHOLE, "RCL303", "a range goes over whole numbers"):
                 return None
         sort = s.NATURAL if low.sort == s.NATURAL else s.INTEGER
         return t.SequenceRange(low, high, s.SequenceSort(sort), self.span(tree))
@@ -220,12 +213,9 @@ class Terms(Names):
         if item is not None:
             expected = s.SetSort(item) if isinstance(tree, syntax.SetDisplay) else s.SequenceSort(item)
         made = self.term(tree, expected)
-        if made is None or isinstance(made.sort, s.SetSort | s.SequenceSort):
-            return made
-        message = f"`in` wants a set or a sequence, and this is of type {show_sort(made.sort)}"
         hint = "write a set as `{a, b}`, a sequence as `<a, b>`, an interval as `low < x < high`"
-        self.error("RCL307", message, tree, hint=hint)
-        return None
+        kinds, what = (s.SetSort, s.SequenceSort), "`in` wants a set or a sequence"
+        return made if made is not None and self.has_sort(tree, made, kinds, "RCL307", what, hint) else None
 
     def not_a_set(self, tree: syntax.Syntax, shown: str) -> None:
         hint = "what a variable ranges over is said in its quantifier: `forall(x in REAL | …)`"
@@ -235,11 +225,8 @@ class Terms(Names):
 
     def numeric(self, tree: syntax.TermSyntax, operator: str) -> t.Term | None:
         term = self.term(tree)
-        if term is not None and not isinstance(term.sort, NUMERIC):
-            message = f"`{operator}` is of numbers, and this is of type {show_sort(term.sort)}"
-            self.error("RCL308", message, tree, notes=self.declared(term))
-            return None
-        return term
+        what = f"`{operator}` is of numbers"
+        return term if term is not None and self.has_sort(tree, term, NUMERIC, "RCL308", what) else None
 
     def arithmetic(self, tree: syntax.Calculation) -> t.Term | None:
         trees = tree.operands
@@ -329,13 +316,9 @@ class Terms(Names):
     ) -> t.Term | None:
         operator = _OPERATORS[relation.type]
         if operator in _ORDERINGS:
-            wrong = [
-                (item, x) for item, x in ((left_tree, left), (right_tree, right)) if not isinstance(x.sort, NUMERIC)
-            ]
-            for at, term in wrong:
-                message = f"`{operator}` is of numbers, and this is of type {show_sort(term.sort)}"
-                self.error("RCL308", message, at, notes=self.declared(term))
-            if wrong:
+            sides, what = ((left_tree, left), (right_tree, right)), f"`{operator}` is of numbers"
+            numbers = [self.has_sort(at, term, NUMERIC, "RCL308", what) for at, term in sides]  # each is reported
+            if not all(numbers):
                 return None
         if isinstance(left.sort, s.SetSort) or isinstance(right.sort, s.SetSort):
             message = f"sets are not compared by `{operator}`: they only stand after `in`"

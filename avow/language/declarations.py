@@ -70,10 +70,9 @@ class Declarations:
                 name = new.name.text
                 notes = ((f"`{name}` is first declared here", old.place),)
                 message = f"`{name}` is declared twice"
-                hint = "remove one of the two" if _same_text(old, new) else "give one of them another name"
+                hint = "remove one of the two, or give one of them another name"
                 if old.reports is not reports:
                     message = f"`{name}` is declared differently in another file"
-                    hint = "write the same in both, or give one of them another name"
                 reports.error("RCL210", message, new.name.start, new.name.end, hint=hint, notes=notes)
 
     def elaborate(self) -> None:

@@ -19,7 +19,7 @@ from avow.language import terms as t
 from avow.language.bounds import constant
 from avow.language.operators import OPPOSITE
 from avow.language.sorts import BOOL, INTEGER, NATURAL, REAL
-from avow.language.subterms import subterms
+from avow.language.subterms import histories, subterms
 
 Facts = tuple[t.Term, ...]
 _ZERO = t.Literal(0, NATURAL)
@@ -27,9 +27,9 @@ _ZERO = t.Literal(0, NATURAL)
 
 def with_value(claim: t.Term) -> t.Term:
     """The conjunction of the claim and that it has a value. Idempotent."""
-    if any(isinstance(part, t.History) for part in subterms(claim)):
+    if histories(claim):
         claim = _at_their_steps(claim)
-        if any(map(_is_response, subterms(claim))):
+        if any(part.operator in t.RESPONSES for part in histories(claim)):
             return _responding(claim)
     needed = _needed(claim)
     if needed == t.TRUE or demanded(claim) is not claim:
@@ -54,10 +54,6 @@ def _responding(claim: t.Term) -> t.Term:
         case t.Quantified(body=body):
             return claim.rebuild((_responding(body),))
     return claim
-
-
-def _is_response(term: t.Term) -> bool:
-    return isinstance(term, t.History) and term.operator in t.RESPONSES
 
 
 def demanded(claim: t.Term) -> t.Term:

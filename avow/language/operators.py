@@ -150,10 +150,6 @@ def _function(
     )  # fmt: skip
 
 
-def _exact(left: Any, right: Any) -> Any:
-    return Fraction(left) / right
-
-
 def _differing(term: Operation) -> Term:
     left, right = term.arguments
     return Not(Iff(left, right), term.span)
@@ -203,7 +199,7 @@ _ROWS = (
     _infix("-", Level.SUM, Typing.NUMBERS, ("-", "-", "-"), operator.sub, lambda z, a, b: a - b, "-", "-", "-"),
     _infix("*", Level.PRODUCT, Typing.NUMBERS, ("*", "·", r"\cdot"), operator.mul,
            lambda z, a, b: a * b, "*", "*", "*"),
-    _infix("/", Level.PRODUCT, Typing.QUOTIENT, ("/", "/", "/"), _exact,
+    _infix("/", Level.PRODUCT, Typing.QUOTIENT, ("/", "/", "/"), lambda a, b: Fraction(a) / b,
            lambda z, a, b: a / b, "/", "Types.Divide", "/"),
     _function(Builtin.XOR, Typing.FORMULAS, operator.ne, lambda z, a, b: z.Xor(a, b), "xor", "!=", LIFTED,
               _differing, (2, 2)),

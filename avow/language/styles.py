@@ -96,10 +96,6 @@ def latex_name(name: str) -> str:
     return rf"\mathit{{{shown}}}{name[len(body) :]}"
 
 
-def _same(text: str) -> str:
-    return text
-
-
 _WORDS = {
     **{row.name: row.rcl for row in OPERATORS.values()},
     **{word: f" {word} " for word in ("in", "!in", "upto", "then", "else")},
@@ -150,7 +146,7 @@ STYLES: dict[StyleName, Style] = {
         arrow=" --> ",
         unspecified="{}",
         sequence=("<", ">"),
-        name=_same,
+        name=str,
         string=quote,
         braces=lambda inner: f"{{{inner}}}",
         tight_quantifier=True,
@@ -176,7 +172,7 @@ STYLES: dict[StyleName, Style] = {
         arrow=" → ",
         unspecified="unspecified",
         sequence=("⟨", "⟩"),
-        name=_same,
+        name=str,
         string=quote,
         braces=lambda inner: f"{{{inner}}}",
         tight_quantifier=False,
@@ -201,7 +197,7 @@ STYLES: dict[StyleName, Style] = {
         arrow=" to ",
         unspecified="unspecified",
         sequence=("<", ">"),
-        name=_same,
+        name=str,
         string=quote,
         braces=lambda inner: f"{{{inner}}}",
         tight_quantifier=False,

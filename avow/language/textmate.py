@@ -26,7 +26,10 @@ def grammar() -> dict[str, Any]:
     types = [word for word, kind in KEYWORDS.items() if kind == "BUILTIN"]
     infix = [word for word in KEYWORDS if word not in (*_STRUCTURE, *_CONTROL, *_CONSTANTS, *types)]
     called = sorted({*Builtin, *Past, "length", "indices"} - set(KEYWORDS))
-    signs = sorted((set(SYMBOLS) | {name for name in OPERATORS if not name.isalpha()}) - _PUNCTUATION, key=_longest)
+    signs = sorted(
+        (set(SYMBOLS) | {name for name in OPERATORS if not name.isalpha()}) - _PUNCTUATION,
+        key=lambda sign: (-len(sign), sign),
+    )
     units = (*UNITS, *LONG_UNITS, *STEPS)
     return {
         "scopeName": SCOPE,
@@ -65,10 +68,6 @@ _NAME = r"[A-Za-z_][A-Za-z0-9_']*"
 
 def _words(words: Iterable[str]) -> str:
     return rf"\b({'|'.join(words)})\b(?!')"
-
-
-def _longest(sign: str) -> tuple[int, str]:
-    return -len(sign), sign
 
 
 def text() -> str:

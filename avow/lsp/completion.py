@@ -80,21 +80,14 @@ class _Place:
 
 def _place_of(text: Text, offset: int) -> _Place | None:
     """The context of an offset; None within a comment or a string."""
-    if any(c.start < offset and (offset < c.end or _goes_on(c, offset)) for c in text.comments):
+    if any(
+        c.start < offset and (offset < c.end or (offset == c.end and c.text.startswith("//"))) for c in text.comments
+    ):
         return None
     if any(t.type == "STRING" and t.start < offset < t.end for t in text.tokens):
         return None
-    before = [t for t in text.tokens if t.end < offset or (t.end == offset and not _is_word(t))]
+    before = [t for t in text.tokens if t.end < offset or (t.end == offset and not t.text[:1].isidentifier())]
     return _scan([t for t in before if t.start < offset])
-
-
-def _goes_on(comment: Token, offset: int) -> bool:
-    """Whether text typed at the end of a comment belongs to it."""
-    return comment.text.startswith("//") and offset == comment.end
-
-
-def _is_word(token: Token) -> bool:
-    return token.text[:1].isalpha() or token.text[:1] == "_"
 
 
 def _scan(found: Sequence[Token]) -> _Place:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import assert_never
 
@@ -199,7 +199,7 @@ class _Reader:
                     body = unparenthesised(value)
                     names_set = isinstance(body, SetDisplay) and name.text in self.environment.types
                     for one in self.in_formula(value, {}):
-                        yield _declaring(one) if names_set and one.meaning.what is What.ELEMENT else one
+                        yield replace(one, declares=True) if names_set and one.meaning.what is What.ELEMENT else one
                 case Define():
                     yield from self.in_definition(declaration)
                 case _:
@@ -295,10 +295,6 @@ class _Reader:
                 ports = self.nodes.get(self.node, Ports())
                 meaning = self.meaning(token.text) if role is None else ports.meaning(self.node, token.text, role)
                 yield from self.at(meaning, token.start, token.end)
-
-
-def _declaring(one: Occurrence) -> Occurrence:
-    return Occurrence(one.meaning, one.file, one.start, one.end, True)
 
 
 def at_offset(found: Iterable[Occurrence], file: str, offset: int) -> Occurrence | None:

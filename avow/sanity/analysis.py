@@ -350,7 +350,7 @@ class _Analysis:
             **{f"{label} again": substitute(f, again) for label, f in group.guarantees.items()},
             "different": Not(Compare("==", output, again[output])),
         }
-        for given in self._attempts():
+        for given in ({}, self.scenario) if self.scenario else ({},):  # an answer without the scenario is stronger
             answer = solve(question, effort=self.limit, seed=self.seed, given=given, values="if any")
             if answer.status == "unsat" and not given:
                 if doubted(answer, question):
@@ -374,10 +374,6 @@ class _Analysis:
     ) -> Realizability:
         about = self.inputs, self.outputs, assumed, wanted
         return realizable(*about, given=given, effort=effort, seed=self.seed, doubtful=doubtful)
-
-    def _attempts(self) -> tuple[Given, ...]:
-        """First without the scenario: an answer without it is stronger."""
-        return ({}, self.scenario) if self.scenario else ({},)
 
     def _some(self, assumed: Mapping[str, Term]) -> bool:
         """Whether any input of the scenario satisfies these: without one, nothing has been checked."""

@@ -7,8 +7,9 @@ every witness is proved to work before it counts. Only the `axioms` must be true
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
+from itertools import chain
 
 from avow.base.tuning.bounds import NUMBERS_PAIRED
 from avow.base.tuning.sizes import REWRITTEN_DEPTH
@@ -19,6 +20,8 @@ from avow.language import sorts as s
 from avow.language import terms as t
 from avow.language.subterms import subterms
 from avow.sanity.extremes import Extreme, bounded, measures
+
+Known = Mapping[t.Variable, t.Term]
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,45 +68,52 @@ def candidates(
 ) -> Candidates:
     """Read the candidates off a contract's formulas."""
     found = Candidates(tuple(outputs))
-    for formula in assumptions:
+    for formula in chain(assumptions, guarantees):
         if depth(formula) <= REWRITTEN_DEPTH:
-            _visit(found, push_negations(formula), {}, (), ())
-    for formula in guarantees:
-        if depth(formula) <= REWRITTEN_DEPTH:
-            _visit(found, push_negations(formula), {}, (), ())
+            _visit(found, push_negations(formula), _Under())
     return found
 
 
 # -- reading the guarantees --------------------------------------------------------------------------------------------
 
 
-def _visit(
-    found: Candidates,
-    term: t.Term,
-    known: Mapping[t.Variable, t.Term],
-    conditions: tuple[t.Term, ...],
-    open_variables: tuple[t.Variable, ...],
-) -> None:
-    """Reads `term` (in negation normal form), demanded under `conditions`, for all `open_variables`.
+@dataclass(frozen=True, slots=True)
+class _Under:
+    """A term is demanded under `conditions` (in its own variables), for all `open` variables. `known` maps the bound
+    variables on the way to their constants."""
 
-    `known` maps the bound variables on the way to their constants; `conditions` are in the term's own variables.
-    """
-    found.effort -= 1 + len(conditions)
+    known: Known = field(default_factory=dict)
+    conditions: tuple[t.Term, ...] = ()
+    open: tuple[t.Variable, ...] = ()
+
+    def given(self, *more: t.Term) -> _Under:
+        return replace(self, conditions=(*self.conditions, *more))
+
+    @property
+    def outer(self) -> dict[t.Variable, t.Term]:
+        """The constants, except for those of open variables."""
+        return {v: item for v, item in self.known.items() if v not in self.open}
+
+
+def _visit(found: Candidates, term: t.Term, under: _Under) -> None:
+    """Reads a term in negation normal form."""
+    known = under.known
+    found.effort -= 1 + len(under.conditions)
     if found.effort <= 0:
         return
     if not found.mentions(term):
         if isinstance(term, t.Quantified) and term.quantifier is not t.Quantifier.FORALL:
             inner = _choose(found, term.variables, [term.body], known)
-            _visit(found, term.body, inner, conditions, open_variables)
+            _visit(found, term.body, replace(under, known=inner))
         elif isinstance(term, t.And):
             for item in term.items:
-                _visit(found, item, known, conditions, open_variables)
+                _visit(found, item, under)
         _remember(found, term, known)
         return
     match term:
         case t.And(items=items):
             for item in items:
-                _visit(found, item, known, conditions, open_variables)
+                _visit(found, item, under)
         case t.Or(items=items):
             free = tuple(item for item in items if not found.mentions(item))
             bound = tuple(item for item in items if found.mentions(item))
@@ -113,25 +123,25 @@ def _visit(
                 if found.effort <= 0:
                     break
                 others = tuple(negation(o) for o in bound if o is not item)
-                _visit(found, item, known, (*conditions, *map(negation, free), *others), open_variables)
+                _visit(found, item, under.given(*map(negation, free), *others))
         case t.Implies(left=left, right=right):
-            _visit(found, t.Or((negation(left), right)), known, conditions, open_variables)
+            _visit(found, t.Or((negation(left), right)), under)
         case t.Iff(left=left, right=right):
             for one, other in ((left, right), (right, left)):
                 _remember(found, other, known)
-                _visit(found, one, known, (*conditions, other), open_variables)
-                _visit(found, push_negations(t.Not(one)), known, (*conditions, negation(other)), open_variables)
+                _visit(found, one, under.given(other))
+                _visit(found, push_negations(t.Not(one)), under.given(negation(other)))
         case t.Conditional(condition=condition, then=then, otherwise=otherwise):
             _remember(found, condition, known)
-            _visit(found, then, known, (*conditions, condition), open_variables)
-            _visit(found, otherwise, known, (*conditions, negation(condition)), open_variables)
+            _visit(found, then, under.given(condition))
+            _visit(found, otherwise, under.given(negation(condition)))
         case t.Quantified(quantifier=t.Quantifier.FORALL, variables=variables, body=body):
+            opened = replace(under, open=(*under.open, *variables))
             for item in body.items if isinstance(body, t.And) else (body,):
                 guards = [negation(o) for o in _alternatives(item) if not found.mentions(o)]
                 for constant in _extremes(found, variables, guards, item, known):
-                    _visit(found, item, {**known, variables[0]: constant}, conditions, (*open_variables, *variables))
-                inner = _choose(found, variables, guards, known)
-                _visit(found, item, inner, conditions, (*open_variables, *variables))
+                    _visit(found, item, replace(opened, known={**known, variables[0]: constant}))
+                _visit(found, item, replace(opened, known=_choose(found, variables, guards, known)))
         case t.Quantified(variables=variables, body=body):
             for item in body.items if isinstance(body, t.Or) else (body,):
                 parts = item.items if isinstance(item, t.And) else (item,)
@@ -140,9 +150,9 @@ def _visit(
                 # The chosen constants replace the variables in everything that follows, including definitions.
                 here = {v: inner[v] for v in variables}
                 replaced = substitute(item, here)
-                _visit(found, replaced, inner, conditions, open_variables)
+                _visit(found, replaced, replace(under, known=inner))
         case _:  # an atom: a suggestion is read off it if it is an equation or a bound
-            _atom(found, term, known, conditions, open_variables)
+            _atom(found, term, under)
 
 
 def _alternatives(term: t.Term) -> tuple[t.Term, ...]:
@@ -156,7 +166,7 @@ def _alternatives(term: t.Term) -> tuple[t.Term, ...]:
 
 
 def _choose(
-    found: Candidates, variables: Sequence[t.Variable], guards: Sequence[t.Term], known: Mapping[t.Variable, t.Term]
+    found: Candidates, variables: Sequence[t.Variable], guards: Sequence[t.Term], known: Known
 ) -> dict[t.Variable, t.Term]:
     """A constant for each variable, such that the guards hold for them if they hold for any values."""
     inner = dict(known)
@@ -187,7 +197,7 @@ def _extremes(
     variables: Sequence[t.Variable],
     guards: Sequence[t.Term],
     item: t.Term,
-    known: Mapping[t.Variable, t.Term],
+    known: Known,
 ) -> Iterator[t.Variable]:
     """Constants for the decisive positions, if a demand on all positions compares outputs with numbers."""
     if len(variables) > 1:
@@ -206,7 +216,7 @@ def _extremes(
         yield constant
 
 
-def _remember(found: Candidates, term: t.Term, known: Mapping[t.Variable, t.Term]) -> None:
+def _remember(found: Candidates, term: t.Term, known: Known) -> None:
     """Keep the ground terms in a term that mentions no output: arguments for constructors."""
     for part in subterms(term):
         if part.sort == s.BOOL or isinstance(part, t.Quantified | t.SetTerm | t.SequenceRange) or found.mentions(part):
@@ -224,19 +234,13 @@ def _add(found: Candidates, term: t.Term) -> None:
         terms.append(term)
 
 
-def _atom(
-    found: Candidates,
-    term: t.Term,
-    known: Mapping[t.Variable, t.Term],
-    conditions: tuple[t.Term, ...],
-    open_variables: tuple[t.Variable, ...],
-) -> None:
+def _atom(found: Candidates, term: t.Term, under: _Under) -> None:
     """Reads an atom or negated atom that mentions an output."""
     positive = not isinstance(term, t.Not)
     atom = term.body if isinstance(term, t.Not) else term
     match atom:
         case t.Apply(function=t.Variable() as function, arguments=arguments) if function in found.outputs:
-            definition = _definition(function, arguments, conditions, open_variables, known)
+            definition = _definition(function, arguments, under)
             if definition is not None:
                 side = found.lower if positive else found.upper
                 side.setdefault(function, []).append(definition)
@@ -244,18 +248,18 @@ def _atom(
             for one, other in ((left, right), (right, left)):
                 if isinstance(one, t.Apply) and one.function in found.outputs and operator == "==":
                     assert isinstance(one.function, t.Variable)
-                    _branch(found, one.function, one.arguments, other, conditions, open_variables, known)
+                    _branch(found, one.function, one.arguments, other, under)
                 else:
-                    _suggest(found, one, other, operator, known)
+                    _suggest(found, one, other, operator, under.known)
         case t.In(item=t.Variable() as output, collection=t.SetTerm(items=items) | t.SequenceTerm(items=items)):
             for item in items:
-                _suggest(found, output, item, "==", known)
+                _suggest(found, output, item, "==", under.known)
     for part in subterms(atom):
         if not found.mentions(part):
-            _remember(found, part, known)
+            _remember(found, part, under.known)
 
 
-def _suggest(found: Candidates, left: t.Term, right: t.Term, operator: str, known: Mapping[t.Variable, t.Term]) -> None:
+def _suggest(found: Candidates, left: t.Term, right: t.Term, operator: str, known: Known) -> None:
     """From ``left ~ right``, with one output on the left side: possible values of that output."""
     while not isinstance(left, t.Variable):
         match left:
@@ -301,7 +305,7 @@ def _suggest(found: Candidates, left: t.Term, right: t.Term, operator: str, know
             options.append(option)
 
 
-def _floor(found: Candidates, value: t.Term, known: Mapping[t.Variable, t.Term]) -> t.Term:
+def _floor(found: Candidates, value: t.Term, known: Known) -> t.Term:
     """A constant for the greatest integer not greater than a number: it exists, but RCL has no term for it."""
     ground = substitute(value, dict(known))
     if ground not in found.floors:
@@ -337,30 +341,24 @@ def _neighbours(value: t.Term) -> list[t.Term]:
 # -- functions ---------------------------------------------------------------------------------------------------------
 
 
-def _definition(
-    function: t.Variable,
-    arguments: Sequence[t.Term],
-    conditions: Sequence[t.Term],
-    open_variables: Sequence[t.Variable],
-    known: Mapping[t.Variable, t.Term],
-) -> Definition | None:
+def _definition(function: t.Variable, arguments: Sequence[t.Term], under: _Under) -> Definition | None:
     """The arguments at which a demand is made: those with values of the open variables that satisfy the conditions."""
     sort = function.sort
     assert isinstance(sort, s.FunctionSort)
-    if any(function in free_variables(term) for term in (*arguments, *conditions)):
+    if any(function in free_variables(term) for term in (*arguments, *under.conditions)):
         return None
-    outer = {v: item for v, item in known.items() if v not in open_variables}
-    conditions = [substitute(condition, outer) for condition in conditions]
+    outer = under.outer
+    conditions = [substitute(condition, outer) for condition in under.conditions]
     arguments = [substitute(argument, outer) for argument in arguments]
     names = {v.name for term in (*arguments, *conditions) for v in subterms(term) if isinstance(v, t.Variable)}
-    names |= {v.name for v in open_variables}
+    names |= {v.name for v in under.open}
     parameters = []
     for k, parameter_sort in enumerate(sort.parameters):
         name = f"p{k}"
         while name in names:
             name += "'"
         parameters.append(t.Variable(t.Role.BOUND, name, parameter_sort))
-    rest = list(open_variables)
+    rest = list(under.open)
     equations: list[t.Term] = []
     direct: dict[t.Variable, t.Term] = {}
     for parameter, argument in zip(parameters, arguments, strict=True):
@@ -383,26 +381,18 @@ def _stands_for(parameter: t.Variable, argument: t.Variable) -> bool:
     return argument.sort == parameter.sort or (argument.sort, parameter.sort) == (s.NATURAL, s.INTEGER)
 
 
-def _branch(
-    found: Candidates,
-    function: t.Variable,
-    arguments: Sequence[t.Term],
-    value: t.Term,
-    conditions: Sequence[t.Term],
-    open_variables: Sequence[t.Variable],
-    known: Mapping[t.Variable, t.Term],
-) -> None:
+def _branch(found: Candidates, function: t.Variable, arguments: Sequence[t.Term], value: t.Term, under: _Under) -> None:
     """Reads a demand ``out.f(arguments) == value`` under the conditions."""
     if value.sort == s.BOOL or function in free_variables(value):
         return
-    definition = _definition(function, arguments, conditions, open_variables, known)
+    definition = _definition(function, arguments, under)
     if definition is None:
         return
-    direct: dict[t.Variable, t.Term] = {v: term for v, term in known.items() if v not in open_variables}
+    direct = under.outer
     for parameter, argument in zip(definition.parameters, arguments, strict=True):
-        if isinstance(argument, t.Variable) and argument in open_variables and _stands_for(parameter, argument):
+        if isinstance(argument, t.Variable) and argument in under.open and _stands_for(parameter, argument):
             direct.setdefault(argument, parameter)
     result = substitute(value, direct)
-    if any(v in open_variables for v in free_variables(result)):
+    if any(v in under.open for v in free_variables(result)):
         return
     found.branches.setdefault(function, []).append((definition, result))
