@@ -8,12 +8,13 @@ from dataclasses import replace
 from avow.assurance.facts import Facts
 from avow.assurance.model import Currency, DerivationView, Handled, ObligationView, OpenItem, RequirementView
 from avow.assurance.naming import derivation_claim, requirement_claim, short
-from avow.base.plain import listed
-from avow.base.verdict import Link, Verdict
+from avow.base.plain import count, listed
+from avow.base.verdict import Link, Object, Verdict
 from avow.evidence.obligation import Kind
-from avow.evidence.record import Evidence
+from avow.evidence.record import CASE, Evidence
 from avow.evidence.status import Status, weigh
 
+_PROGRAM = (Object.SOURCE, Object.BINARY)
 _WORST_FIRST = (
     Status.CONTRADICTORY,
     Status.REFUTED,
@@ -50,7 +51,7 @@ def open_items(
         if status is Status.ERROR:
             items += _failed_attempts(views)
     items += [_vacuous(view) for view in views if view.status is not Status.VACUOUS and _has_vacuous(view)]
-    items += [item for view in views if view.status.supports for item in _given_up(view)]
+    items += [item for view in views if view.status.supports for item in _given_up(view, views)]
     for d in derivations:
         if not d.status.supports and not d.below:
             text = f"the derivation is {d.status.value}: a premise or a side condition stands for nothing"
@@ -126,24 +127,55 @@ def worst_first(names: Iterable[str], statuses: Mapping[str, Status]) -> tuple[s
     return tuple(sorted(names, key=key))
 
 
-def _given_up(view: ObligationView) -> Iterable[OpenItem]:
-    """A refutation of the claim as it is now, by a method that the plan no longer uses for it, or with a file that the
-    method no longer reads: neither change refutes the refutation."""
+def _given_up(view: ObligationView, views: Sequence[ObligationView]) -> Iterable[OpenItem]:
+    """A refutation of the claim as it is now, by a method that the plan no longer uses for it, or by one that now reads
+    other files or has other options and supports the claim: none of these changes refutes the refutation."""
     for item in view.evidence:
         record = item.entry.evidence
         if record.obligation_digest != view.obligation.digest or not weigh(record).refuted:
             continue
-        missed = _no_longer_read(record, view.records) if item.currency is Currency.STALE else ()
+        missed = _no_longer_asked(record, view, views) if item.currency is Currency.STALE else ""
         if item.currency is Currency.WITHDRAWN or missed:
-            what = f"uses {record.method} for it" if not missed else f"has it read {listed(missed, 3)}"
+            what = missed or f"uses {record.method} for it"
             text = f"{record.method} refuted it on {record.started[:10]}; the plan no longer {what}"
             yield OpenItem("withdrawn", view.id, text, title=view.obligation.claim)
 
 
-def _no_longer_read(refuting: Evidence, counting: Iterable[Evidence]) -> list[str]:
-    """The files that a method read when it refuted a claim and no longer reads, if all others are unchanged."""
-    same = (r for r in counting if r.method == refuting.method and r.inputs.items() < refuting.inputs.items())
-    return sorted(next((refuting.inputs.keys() - now.inputs.keys() for now in same), ()))
+def _no_longer_asked(refuting: Evidence, view: ObligationView, views: Sequence[ObligationView]) -> str:
+    """What the plan no longer has a method do that refuted a claim of the same program; empty if the program, a file or
+    the tool is another, or if the refuting case was run again. A recording does not name its program: whether it
+    changed is known from the files of the methods that run it."""
+    recorded = refuting.of is Object.RECORDING
+    entries = [item.entry.evidence for item in view.evidence]
+    then = [r for r in entries if r.run == refuting.run or r.started < refuting.started]
+    programs = _read(r for r in then if r.of in _PROGRAM) if recorded else {}
+    now = _read(r for r in view.records if r.of in _PROGRAM) if recorded else {}
+    same = bool(programs.keys() & now.keys())
+    for record in (r for r in view.records if r.method == refuting.method and weigh(r).support):
+        before, after = (programs, now) if same else (refuting.inputs, record.inputs)
+        if any(after.get(path, mark) != mark for path, mark in before.items()):
+            continue
+        missed = sorted(path for path, mark in refuting.inputs.items() if record.inputs.get(path) != mark)
+        if missed and (recorded or record.inputs.items() <= refuting.inputs.items()):
+            return f"has it read {listed(missed, 3)}{_relying(missed, refuting, views)}"
+        if (record.inputs, record.tool_version) == (
+            refuting.inputs,
+            refuting.tool_version,
+        ) and CASE not in refuting.details:
+            return "has the options with which it did"
+    return ""
+
+
+def _relying(missed: Sequence[str], refuting: Evidence, views: Sequence[ObligationView]) -> str:
+    """How many other claims count evidence from the files by which a claim was refuted."""
+    files = {(path, refuting.inputs[path]) for path in missed}
+    many = sum(any(files <= r.inputs.items() for r in v.records) for v in views if v.id != refuting.obligation)
+    return f", on which {count(many, 'other claim')} still rel{'ies' if many == 1 else 'y'}" if many else ""
+
+
+def _read(records: Iterable[Evidence]) -> dict[str, str]:
+    """The files that the newest of some records, oldest first, depend on."""
+    return {path: mark for record in records for path, mark in record.inputs.items()}
 
 
 def _open(view: ObligationView, said: Mapping[str, str]) -> OpenItem:

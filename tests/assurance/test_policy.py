@@ -17,7 +17,7 @@ from avow.assurance.policy import Demand, costs, profile, profile_names, read_po
 from avow.base.diagnostics import Rejected, Span
 from avow.base.verdict import Link, Object, Verdict
 from avow.evidence.obligation import Kind, Obligation
-from avow.evidence.record import ISOLATION, SIGNED_BY, SOLVER, Evidence
+from avow.evidence.record import CASE, ISOLATION, SIGNED_BY, SOLVER, Evidence
 from avow.evidence.status import Status
 from avow.report.short import terminal_lines
 from avow.system.plan import Finding, Located, Requirement
@@ -426,6 +426,56 @@ def test_a_refutation_by_a_file_that_is_no_longer_read_is_told_of(read: dict[str
     assert found.obligations[0].status is Status.TESTED
     assert any("the plan no longer has it read bad" in i.text and not i.advice for i in found.open_items) is told
     assert ("withdrawn" in {d.key for d in found.deficits}) is told
+
+
+@pytest.mark.parametrize(
+    ("read", "program", "told"),
+    [
+        ({"other": "5"}, "1", True),
+        ({"msg": "1", "other": "5"}, "1", True),
+        ({"msg": "1", "bad": "6"}, "1", True),
+        ({"msg": "1", "other": "5"}, "7", False),
+        ({"msg": "1", "other": "5"}, "", True),
+        ({"msg": "1", "bad": "6"}, "", False),
+    ],
+)
+def test_another_recording_refutes_no_refutation_of_the_same_program(
+    read: dict[str, str], program: str, told: bool
+) -> None:
+    """`program`: its digest now, 1 when the recording refuted; empty: no method reads it."""
+    subject = system({"n": ["g"]}, plans=[node_plan("n", "low", "rosmonitoring", "hypothesis")])
+    recording = evidence("n.g", Verdict.REFUTED, "rosmonitoring", key="before", of=Object.RECORDING)
+    refuted = replace(recording, inputs={"msg": "1", "bad": "2"})
+    now = replace(recording, key="now", verdict=Verdict.MONITORED, strength=Verdict.MONITORED, inputs=read)
+    run = replace(TEST, of=Object.SOURCE, inputs={"program": "1"})
+    again = replace(run, key="again", inputs={"program": program}, run="later", started="2026-11-22")
+    records = [run, refuted, now, again] if program else [refuted, now]
+    keys = {(r.obligation, r.method): r.key for r in records}
+    found = case(subject, [guarantee("n", "g")], records, keys=keys)
+    assert found.obligations[0].status.supports
+    assert ("withdrawn" in {d.key for d in found.deficits}) is told
+    other = evidence("m.h", Verdict.MONITORED, "rosmonitoring", inputs=refuted.inputs)
+    both = system({"n": ["g"], "m": ["h"]}, plans=[node_plan(n, "low", "rosmonitoring", "hypothesis") for n in "nm"])
+    asked = {**keys, (other.obligation, other.method): other.key}
+    found = case(both, [guarantee("n", "g"), guarantee("m", "h")], [*records, other], keys=asked)
+    assert any(", on which 1 other claim still relies" in i.text for i in found.open_items) is told
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        ({}, True),
+        ({"details": {CASE: {"x": 1}}}, False),
+        ({"tool_version": "0"}, False),
+        ({"inputs": {"p": "0"}}, False),
+    ],
+)
+def test_other_options_refute_no_refutation(change: dict[str, Any], told: bool) -> None:
+    subject = system({"n": ["g"]}, plans=[node_plan("n", "low", "hypothesis")])
+    now = replace(TEST, inputs={"p": "1"})
+    refuted = replace(now, key="before", verdict=Verdict.REFUTED, **change)
+    found = case(subject, [guarantee("n", "g")], [refuted, now], keys={(now.obligation, "hypothesis"): now.key})
+    assert any("no longer has the options" in i.text for i in found.open_items) is told
 
 
 def test_reproduction_asks_nothing_of_guarantees() -> None:
