@@ -8,7 +8,7 @@ evidence; it is no evidence.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import field
 from enum import StrEnum
 
@@ -47,11 +47,13 @@ class Level(StrEnum):
     SHOWN = "shown"
     """Every guarantee below is proved, or checked exhaustively, of the program that runs."""
     MODELS = "shown of models"
-    """Some guarantee below is proved or checked of a model only: the program that runs may differ."""
+    """Some guarantee below is proved or checked of a model only, or the wiring alone implies the requirement: the
+    program that runs may differ."""
     TESTS = "shown by tests"
     """Some guarantee below, or the requirement itself, is sampled: tests, recordings, measurements."""
-    TESTED_MODELS = "shown by tests of models"
-    """Some guarantee below is sampled of a model only: the program that runs may differ, and so may other inputs."""
+    TESTED_MODELS = "shown by tests and of models"
+    """Some claim below is sampled, and some guarantee below is shown of a model only: other inputs may differ, and so
+    may the program that runs."""
     ARGUED = "argued"
     """A person states that the guarantees named amount to the sentence, or that some guarantee below holds."""
     NOT_SHOWN = "not shown"
@@ -65,12 +67,20 @@ class Level(StrEnum):
     def holds(self) -> bool:
         return self in (Level.SHOWN, Level.MODELS, Level.TESTS, Level.TESTED_MODELS, Level.ARGUED)
 
+    @staticmethod
+    def lowest(levels: Iterable[Level]) -> Level | None:
+        """The worst of some levels. Samples and models are two weaknesses: with one of each, there are both."""
+        found = set(levels)
+        if {Level.MODELS, Level.TESTS} <= found:
+            found.add(Level.TESTED_MODELS)
+        return max(found, key=tuple(Level).index, default=None)
+
 
 MEANINGS = {
     Level.SHOWN: "everything below is proved, or checked exhaustively, of the running program",
-    Level.MODELS: "something below is proved or checked of a model only; the program may differ",
+    Level.MODELS: "something below is proved or checked of a model, or of the wiring, only; the program may differ",
     Level.TESTS: "something below is sampled: tests, recordings or measurements",
-    Level.TESTED_MODELS: "something below is sampled, of a model only; the program may differ",
+    Level.TESTED_MODELS: "something below is sampled, and something is of a model only; the program may differ",
     Level.ARGUED: "a person vouches for the sentence or for a guarantee below",
     Level.NOT_SHOWN: "evidence is missing or stale, the requirement is not validated, or a claim below is not shown",
     Level.REFUTED: "there is a counterexample",

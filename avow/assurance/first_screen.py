@@ -199,7 +199,7 @@ def _verdict(
         return Level.EXAMINED, said(Level.EXAMINED, "no requirement is named"), Tone.GREY
     if missing:
         return Level.NOT_SHOWN, said(Level.NOT_SHOWN, f"{len(missing)} {of_all} not validated"), Tone.AMBER
-    level = max((r.level for r in requirements), key=tuple(Level).index)
+    level = Level.lowest(r.level for r in requirements) or Level.NOT_SHOWN
     tone = min((r.tone for r in requirements), key=_rank)
     rates = [r.rate for r in requirements if r.rate is not None]
     worst = max(rates, key=lambda rate: Fraction(rate.bound or 1), default=None)

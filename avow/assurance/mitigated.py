@@ -82,11 +82,11 @@ def hazard_views(
     found = []
     for hazard in hazards:
         items = list(map(mitigation, hazard.mitigated_by))
-        level = min((m.level for m, _, _ in items), key=WORST_FIRST.index, default=Level.NOT_SHOWN)
+        level = Level.lowest(m.level for m, _, _ in items) or Level.NOT_SHOWN
         tone = min((tone for _, tone, _ in items), key=lambda t: t.rank, default=Tone.RED)
         own = (name for m, _, _ in items for name in ((requirement_claim(m.name),) if m.name in known else m.claims))
         below = closure.of(own)
-        least = min(((weak, m.name) for m, _, weak in items if m.level is level), default=((), ""))[1]
+        least = min(((WORST_FIRST.index(m.level), weak, m.name) for m, _, weak in items), default=("",))[-1]
         found.append(HazardView(hazard, tuple(m for m, _, _ in items), level, tone, below.claims, least))
     return tuple(found)
 

@@ -109,17 +109,18 @@ def is_bounded(claims: Iterable[str], relied: Mapping[str, Relied]) -> bool:
 
 
 def level_of(claims: Iterable[str], views: Mapping[str, ObligationView], relied: Mapping[str, Relied]) -> Level:
-    """The lowest level among claims that hold. Conditions of the composition that a person answers for are among the
-    assumptions; agreement of a program with its model counts under the model."""
+    """The lowest level of claims that hold. Samples and models are two weaknesses, of whichever claims; without a
+    guarantee below, the claims are about the wiring, which is a model. Conditions of the composition that a person
+    answers for are among the assumptions; agreement of a program with its model counts under the model."""
     below = [(views[name].obligation.kind, relied[name]) for name in claims if name in relied]
     leaves = [found for kind, found in below if kind in (Kind.GUARANTEE, Kind.REQUIREMENT)]
     statuses, sampled = {found.status for found in leaves}, {Status.TESTED, Status.MONITORED}
     if statuses & {Status.REVIEWED, Status.JUSTIFIED}:
         return Level.ARGUED
-    models = {found.status for kind, found in below if kind is Kind.GUARANTEE and looked_at(found) is Object.MODEL}
+    objects = {looked_at(found) for kind, found in below if kind is Kind.GUARANTEE} or {Object.MODEL}
     if statuses & sampled:
-        return Level.TESTED_MODELS if models & sampled else Level.TESTS
-    return Level.MODELS if models else Level.SHOWN
+        return Level.TESTED_MODELS if Object.MODEL in objects else Level.TESTS
+    return Level.MODELS if Object.MODEL in objects else Level.SHOWN
 
 
 def _failing_of(

@@ -11,7 +11,7 @@ from fractions import Fraction
 from typing import Any
 
 Json = dict[str, Any]
-HOLDS = ("shown", "shown of models", "shown by tests", "shown by tests of models", "argued")
+HOLDS = ("shown", "shown of models", "shown by tests", "shown by tests and of models", "argued")
 _SUPPORTS = ("proved", "checked", "tested", "monitored", "reviewed", "justified")
 """Best first."""
 _STRICT = 1 - 1e-5

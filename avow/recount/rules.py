@@ -16,6 +16,7 @@ from avow.recount.facts import HOLDS, Facts
 from avow.recount.page import CELL, Block
 
 _Numbers = tuple[str | None, ...] | None
+_WORST = ("refuted", "not shown", *reversed(HOLDS))
 HAZARD = 45
 """Characters of a hazard's text on the first screen."""
 _SORTS = {
@@ -140,7 +141,8 @@ def _hazard(facts: Facts, match: re.Match[str], _block: Block) -> _Numbers:
     hazard = next((h for h in facts.hazards if " ".join(h["hazard"]["text"].split()) == match[2]), None)
     if hazard is None:
         return None
-    least = [m["name"] for m in hazard["mitigations"] if m["level"] == hazard["level"]]
+    worst = min((_WORST.index(m["level"]) for m in hazard["mitigations"]), default=0)
+    least = [m["name"] for m in hazard["mitigations"] if m["level"] == _WORST[worst]]
     shown = match[3] if match[3] in least else least[0]
     return hazard["hazard"]["id"], match[2], shown, ", ".join(hazard["hazard"]["mitigated_by"])
 
@@ -148,7 +150,7 @@ def _hazard(facts: Facts, match: re.Match[str], _block: Block) -> _Numbers:
 def _dangers(facts: Facts, match: re.Match[str], _block: Block) -> _Numbers:
     """The hazards of each level, and how many of it are not named; then, of many requirements, how many are not."""
     told = []
-    for level in ("refuted", "not shown", *reversed(HOLDS)):
+    for level in _WORST:
         own = [h["hazard"] for h in facts.hazards if h["level"] == level]
         texts = [h["text"] if len(h["text"]) <= HAZARD else h["text"][: HAZARD - 1].rstrip() + "…" for h in own]
         names = [f"{h['id']} {text} ({h['severity']})" for h, text in zip(own[:3], texts, strict=False)]

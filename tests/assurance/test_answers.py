@@ -13,7 +13,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from assurance.sample import TODAY, case, evidence, guarantee, node_plan, obligation, rover_case, system
+from assurance.sample import (
+    TODAY,
+    case,
+    evidence,
+    guarantee,
+    node_plan,
+    obligation,
+    rover_case,
+    system,
+    validated,
+)
 from avow.assurance.answers import (
     ABOUT,
     MEANINGS,
@@ -171,7 +181,7 @@ def test_the_verdict_counts_what_it_speaks_of_and_follows_from_what_the_case_hol
 @given(records(), statements(), st.booleans())
 def test_no_verdict_is_above_what_lies_below_it(listed: list[Evidence], said: list[Statement], formal: bool) -> None:
     found = build(listed, said, formal=formal, hazards=HAZARDS)
-    best = Level.SHOWN if formal else Level.ARGUED
+    best, seen = Level.SHOWN if formal else Level.ARGUED, set()
     for target in GUARANTEES:
         own = [r for r in listed if r.obligation == target.id]
         sure = [r for r in own if r.verdict in (Verdict.PROVED, Verdict.CHECKED)]
@@ -183,7 +193,10 @@ def test_no_verdict_is_above_what_lies_below_it(listed: list[Evidence], said: li
             least = Level.TESTS if any(r.of is not Object.MODEL for r in tests) else Level.TESTED_MODELS
         else:
             least = Level.ARGUED if any(r.verdict is Verdict.REVIEWED for r in own) else Level.NOT_SHOWN
+        seen.add(least)
         best = max(best, least, key=list(Level).index)
+    if best is Level.TESTS and Level.MODELS in seen:
+        best = Level.TESTED_MODELS
     order = list(Level).index
     (asked,) = found.requirements
     assert order(asked.level) >= order(best)
@@ -205,6 +218,42 @@ def test_no_verdict_is_above_what_lies_below_it(listed: list[Evidence], said: li
                 assert asked.level.holds or taken != {target.id for target in GUARANTEES}
             late = any(a.expired and a.key.startswith(f"assumptions.{method}.") for a in found.assumptions)
             assert not (hazard.level.holds and late)
+
+
+def test_samples_and_models_are_two_weaknesses() -> None:
+    """A proof of a model beside a test of the program, below one requirement or two, and mitigations of a hazard."""
+    model, tested, source = (
+        [evidence(g, verdict, method, of=of) for g in GUARANTEES]
+        for verdict, method, of in (
+            (Verdict.PROVED, "hoare", Object.MODEL),
+            (Verdict.TESTED, "hypothesis", Object.SOURCE),
+            (Verdict.PROVED, "hoare", Object.SOURCE),
+        )
+    )
+    hazard = Hazard("H", "It burns", "critical", mitigated_by=("a", "b"))
+    for records, level in (
+        ([*model[:2], tested[2]], Level.TESTED_MODELS),
+        ([*source[:2], tested[2]], Level.TESTS),
+        ([*source[:2], model[2]], Level.MODELS),
+        (source, Level.SHOWN),
+    ):
+        found = build(records, ALWAYS, formal=True, hazards=[hazard])
+        assert (found.requirements[0].level, found.hazards[0].level) == (level, level)
+    two = [replace(FORMAL, supported_by=("a",)), replace(FORMAL, id="S", supported_by=("b",))]
+    made = subject(two[0])
+    made = replace(made, plan=replace(made.plan, requirements=tuple(map(validated, two))))
+    owns = [replace(OWN, clauses=("a.g", "a.h")), replace(OWN, name="S", clauses=("b.g",))]
+    records = [*model[:2], tested[2], *(evidence(own, method="compose") for own in owns)]
+    both = case(made, [*GUARANTEES, *owns], records)
+    assert [r.level for r in both.requirements] == [Level.MODELS, Level.TESTS]
+    assert both.answers.headline is Level.TESTED_MODELS
+
+
+def test_of_the_wiring_alone_nothing_is_shown_of_the_running_program() -> None:
+    made = subject(replace(FORMAL, supported_by=()), ALWAYS)
+    proof = evidence(OWN, method="compose", details={"needed": [], "certificate": {}})
+    (found,) = case(made, [*GUARANTEES, replace(OWN, clauses=())], [proof]).requirements
+    assert (found.closure, found.level, found.tone) == ((OWN.id,), Level.MODELS, Tone.AMBER)
 
 
 def test_the_words_of_verdicts_are_those_of_the_docs() -> None:

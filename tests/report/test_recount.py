@@ -22,7 +22,7 @@ from avow.assurance.changes import KINDS, baseline_of
 from avow.assurance.deficits import _WORDS, words_of
 from avow.assurance.model import Case
 from avow.base.files import sha256
-from avow.base.verdict import Counterexample, Verdict
+from avow.base.verdict import Counterexample, Object, Verdict
 from avow.evidence.ledger import Ledger
 from avow.kernel.rates import tail
 from avow.pipeline.report_check import check
@@ -66,10 +66,19 @@ def weakened() -> Case:
     return make_case(subject, [target], records, keys=keys_of(records[:1]))
 
 
+def mixed() -> Case:
+    """A hazard with a mitigation that is tested and one that is proved of a model."""
+    a, b = guarantee("a", "g"), guarantee("b", "g")
+    subject = system({"a": ["g"], "b": ["g"]}, hazards=[Hazard("H", "It burns", "critical", mitigated_by=("b", "a"))])
+    records = [evidence(a, Verdict.TESTED, "hypothesis", of=Object.SOURCE), evidence(b)]
+    return make_case(subject, [a, b], records)
+
+
 CASES: dict[str, Callable[[], Case]] = {
     "rate": with_a_rate,
     "examined": examined,
     "weakened": weakened,
+    "mixed": mixed,
     **PAGES,
 }  # type: ignore[dict-item]
 
