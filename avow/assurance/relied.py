@@ -171,8 +171,9 @@ def upper_bound(record: Evidence) -> float | None:
 
 
 def judgements(record: Evidence) -> int:
-    """The number of cases, runs or judgements that it rests on; 0 if it names none."""
-    for key in ("triggered", "judged", "runs", "cases"):
+    """The number of trials that it rests on; 0 if it names none. A run is one trial, whatever the number of its
+    messages: they depend on each other."""
+    for key in ("triggered", "runs", "judged", "cases"):
         value = record.bound.get(key)
         if isinstance(value, int) and not isinstance(value, bool):
             return value
@@ -180,9 +181,14 @@ def judgements(record: Evidence) -> int:
 
 
 def weakness(relied: Relied) -> tuple[int, float, int]:
-    """Sorts the weakest first: by status, then the greatest bound on failures, then the fewest judgements."""
-    bound = upper_bound(relied.record)
-    return relied.status.rank, -(1.0 if bound is None else bound), judgements(relied.record)
+    """Sorts the weakest first: by status, then of all samples the greatest bound on failures. A sample without a bound
+    is placed as if its judgements were trials drawn at random, at 95 % confidence: an
+    order, no claim."""
+    bound, many = upper_bound(relied.record), judgements(relied.record)
+    if bound is None:
+        bound = 1 - 0.05 ** (1 / many) if many else 1.0
+    sampled = relied.status in (Status.TESTED, Status.MONITORED)
+    return Status.MONITORED.rank if sampled else relied.status.rank, -bound, relied.status.rank
 
 
 def seen(relied: Relied) -> str:

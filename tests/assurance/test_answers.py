@@ -43,10 +43,12 @@ from avow.assurance.deficits import _WORDS
 from avow.assurance.deficits import words_of as deficit_words
 from avow.assurance.first_screen import WARNED, _lines, _owners
 from avow.assurance.model import Case
+from avow.assurance.relied import judgements, relied_of, weakness
 from avow.base.plain import identifiers, words_of
 from avow.base.verdict import Hypothesis, HypothesisKind, Link, Object, Verdict, bound
 from avow.evidence.obligation import SYSTEM_LEVEL, Kind, Obligation
 from avow.evidence.record import RATE, Evidence
+from avow.evidence.status import Status
 from avow.system.plan import EnvironmentInput, Hazard, Requirement, Statement, System
 
 NODES = {"a": ["g", "h"], "b": ["g"]}
@@ -247,6 +249,18 @@ def test_samples_and_models_are_two_weaknesses() -> None:
     both = case(made, [*GUARANTEES, *owns], records)
     assert [r.level for r in both.requirements] == [Level.MODELS, Level.TESTS]
     assert both.answers.headline is Level.TESTED_MODELS
+
+
+def test_the_weakest_sample_has_the_highest_bound_whatever_its_kind() -> None:
+    known = {"judged": 60}, {"runs": 40, "triggered": 20, "failure probability at most": 0.13911}, {"judged": 3}
+    kinds = [(Verdict.MONITORED, "rosmonitoring"), (Verdict.TESTED, "experiment"), (Verdict.MONITORED, "rosmonitoring")]
+    tests = [
+        evidence(g, verdict, method, bound=dict(seen))
+        for g, (verdict, method), seen in zip(GUARANTEES, kinds, known, strict=True)
+    ]
+    order = sorted(tests, key=lambda r: weakness(relied_of(r, Status(r.verdict.value))))
+    assert [r.bound for r in order] == [known[2], known[1], known[0]]
+    assert judgements(evidence(GUARANTEES[0], Verdict.TESTED, "hypothesis", bound={"judged": 60, "runs": 3})) == 3
 
 
 def test_of_the_wiring_alone_nothing_is_shown_of_the_running_program() -> None:
