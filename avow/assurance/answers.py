@@ -292,6 +292,8 @@ class Baseline:
     """(id, meaning, level)."""
     gates: tuple[tuple[str, str, bool], ...] = field(default=(), metadata=LATER)
     """(id, title, whether it passed) of the gates that were asked. Empty: signed before hazards and gates were."""
+    says: str = field(default="", metadata=LATER)
+    """The sentence that was signed, of a signature that was read."""
 
 
 @dataclass(frozen=True, slots=True)

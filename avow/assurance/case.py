@@ -161,9 +161,7 @@ def conclude(facts: Facts) -> Case:
         *remarks(facts.sources, views),
     )
     single = _single(views)
-    weakened = deficits(
-        views, requirements, supposed, listed, findings, relied, single, hazards, facts.run.id, missing_tools(facts)
-    )
+    weakened = deficits(views, requirements, supposed, listed, findings, relied, single, hazards, missing_tools(facts))
     changed = changes(facts.baseline, requirements, views, supposed, weakened, hazards, found)
     basis = {n for c in closed.values() for n in c.claims} if closed else set(whole.claims)
     basis |= {n for h in hazards for n in h.closure}

@@ -23,8 +23,6 @@ MARKS = {"open": "✘", "better": "▲", "meaning": "≠", "new": "+"}
 EDITED = 40
 """Characters of a formula, old or new, in a line about its edit; the row of the change has it in full."""
 _RANK = {level: -at for at, level in enumerate(Level)}
-_PASSING = ("believed",)
-"""Deficits of the run, not of the case."""
 
 
 def baseline_of(case: Case, name: str = "", who: str = "", signed_on: str = "", until: str = "") -> Baseline:
@@ -39,7 +37,7 @@ def baseline_of(case: Case, name: str = "", who: str = "", signed_on: str = "", 
         requirements=tuple((r.id, r.meaning, r.level.value, r.formal) for r in case.requirements),
         guarantees=tuple(map(_guarantee, case.guarantees)),
         assumptions=tuple((s.key, s.words, s.until) for s in case.assumptions),
-        deficits=tuple((w.key, w.count) for w in case.deficits if w.key not in _PASSING),
+        deficits=tuple((w.key, w.count) for w in case.deficits),
         hazards=tuple((h.hazard.id, h.meaning, h.level.value) for h in case.hazards),
         gates=tuple((g.id, g.title, g.passed) for g in case.gates if not g.idle),
     )
@@ -204,7 +202,7 @@ def _deficits(old: Baseline, deficits: Sequence[Deficit]) -> Iterator[ChangeLine
     then = dict(old.deficits)
     for w in deficits:
         was = then.get(w.key, 0)
-        if w.key not in _PASSING and w.count > was:
+        if w.count > was:
             yield ChangeLine("deficit", w.key, f"{w.words}: {was or 'none'} → {w.count}", str(was), str(w.count))
     now = {w.key: w.count for w in deficits}
     for key, was in old.deficits:

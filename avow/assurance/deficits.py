@@ -52,11 +52,6 @@ _WORDS = {
     "withdrawn": ("refutation{s} by what the plan no longer uses", "no longer used", "It refuted, and left the plan."),
     "advice": ("open remark{s}", "remarks", "They fail no gate; read them."),
     "excused": ("finding{s} accepted by a person", "excused", "A named person takes responsibility for a finding."),
-    "believed": (
-        "answer{s} from earlier runs",
-        "from earlier runs",
-        "Their inputs have not changed since; `avow verify --fresh` computes them again.",
-    ),
 }
 """For each kind its name, with its number before it; the name on the first screen; and its meaning for the reader."""
 
@@ -84,7 +79,6 @@ def deficits(
     relied: Mapping[str, Relied],
     single: Sequence[str],
     hazards: Sequence[HazardView],
-    run: str,
     missing: Mapping[tuple[str, str], str],
 ) -> tuple[Deficit, ...]:
     """Of the whole case, whether or not a requirement rests on it, as in the tables of nodes and of assumptions.
@@ -115,7 +109,6 @@ def deficits(
         "withdrawn": [item.claim for item in open_items if item.kind == "withdrawn"],
         "advice": [item.claim for item in open_items if item.advice and not item.handled],
         "excused": [name for f in findings if f.how == "accepted" and not f.expired for name in f.obligations],
-        "believed": [f"{v.id}: {r.method}" for v in views for r in v.records if r.run != run],
     }
     silent = [(v, method) for v in programs for method, _ in v.planned]
     most = max((_unanswered_share(v) for v in leaves), default=0)

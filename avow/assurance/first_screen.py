@@ -341,8 +341,11 @@ def _changed(changes: Changes) -> tuple[tuple[str, str], ...]:
 
 
 def with_signature(case: Case) -> Answers:
-    """The answers, with the signature line: the signer, and whether the case is still the signed one."""
-    return replace(case.answers, signed=_signed(case))
+    """The answers, with the signature line (the signer, and whether the case is still the signed one), and of a signed
+    case the sentence that was signed."""
+    signed, said = _signed(case), case.baseline.says if case.baseline else ""
+    kept = said if signed.startswith("signed") and said else case.answers.statement
+    return replace(case.answers, signed=signed, statement=kept)
 
 
 def _signed(case: Case) -> str:

@@ -85,7 +85,7 @@ def read_signed(path: Path) -> Baseline | str:
         return "it is of another system"
     if found.content != content_of(found) or (found.who, found.until) != (predicate.get("as"), predicate.get("until")):
         return "what it names is not what it signs"
-    return replace(found, name=path.name, checked=opened.checked)
+    return replace(found, name=path.name, checked=opened.checked, says=str(predicate.get("says", "")))
 
 
 def _number(path: Path) -> int:

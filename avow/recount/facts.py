@@ -90,6 +90,10 @@ class Facts:
         """Findings that the plan speaks of and that support nothing."""
         return sum(bool(v["handled"]) and v["standing"] not in (*_SUPPORTS, "argued") for v in self.views)
 
+    def signed(self) -> str:
+        """The sentence that was signed, while the case is the signed one."""
+        return self.case["baseline"].get("says", "") if self.case["answers"]["signed"].startswith("signed") else ""
+
     def old(self) -> int:
         return sum(r["run"] != self.case["run"]["id"] for v in self.views for r in records(v))
 
@@ -159,7 +163,6 @@ class Facts:
             "excused": sum(
                 len(f["obligations"]) for f in self.case["findings"] if f["how"] == "accepted" and not f["expired"]
             ),
-            "believed": self.old(),
         }
         loose = {"sampled": sampled, "read": read, "models": model, "tied": hand}
         if key in exact:

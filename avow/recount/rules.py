@@ -49,7 +49,6 @@ _DEFICITS = {
     "refutations? by what the plan no longer uses": "withdrawn",
     "open remarks?": "advice",
     "findings? accepted by a person": "excused",
-    "answers? from earlier runs": "believed",
 }
 
 
@@ -290,6 +289,7 @@ _WHY = r"fails\. (.*?)(?:; and (\d+) more)?(?=\.? Next:|\.? $)"
 _DAY = r"(\d{4}-\d\d-\d\d)"
 
 RULES = (
+    _rule("signature", r"^ (By signing .*) $", lambda f, m, _: m.groups() if m[1] == f.signed() else None),
     _rule("q5", r"^ (.*) $", lambda f, m, _: m.groups() if m[1] in [e["words"] for e in f.changes] else None),
     _rule("changes", r"^ ␟([^␟]*)␟([^␟]*)␟([^␟]*)␟([^␟]*)$", _change),
     _rule("", rf"\b({_SEEN})", _seen),
@@ -363,5 +363,4 @@ RULES = (
 
 
 def _unread(facts: Facts) -> _Numbers:
-    missing = len([r for r in facts.requirements if r["level"] not in HOLDS])
-    return str(missing), str(len(facts.requirements))
+    return str(sum(r["level"] not in HOLDS for r in facts.requirements)), str(len(facts.requirements))

@@ -110,6 +110,21 @@ def test_a_true_page_is_borne_out(name: str) -> None:
     assert recounted(*made(name)) == []
 
 
+@pytest.mark.parametrize("number", [3, 6, 10, 12])
+def test_any_number_of_tools_is_borne_out(number: int) -> None:
+    target, versions = guarantee("n", "g"), ("1.0", "2", "4.16.0.0", "Python 3.11", "(x) 3")
+    records = [
+        evidence(target, Verdict.TESTED, f"hypothesis-{at}", tool=f"tool{at}", tool_version=versions[at % 5])
+        for at in range(number)
+    ]
+    texts = dict(every_text(make_case(system({"n": ["g"]}), [target], records)))
+    page, data = texts["index.html"], texts["report.json"].encode()
+    assert recounted(page, data) == []
+    many = f"and {number - 5} more)"
+    assert (many in page) == (number > 5)
+    assert number < 6 or recounted(page.replace(many, f"and {number - 4} more)"), data) != []
+
+
 def test_another_report_json_is_named_as_such() -> None:
     page, data = made("rate")
     (line,) = recounted(page, data + b"\n")

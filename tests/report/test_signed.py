@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 from assurance.sample import case, evidence, guarantee, system
 from click.testing import CliRunner
+from helpers import every_text
 
 from avow.assurance.answers import Baseline
 from avow.assurance.model import Case
@@ -20,6 +21,7 @@ from avow.base.verdict import Verdict
 from avow.cli.diff import command as diff
 from avow.evidence.envelope import seal, unseal
 from avow.evidence.signing import new_key_pair
+from avow.recount import recounted
 from avow.report import render_all
 from avow.report.answers_page import render_answers
 from avow.system.plan import Requirement
@@ -58,6 +60,24 @@ def test_a_signature_by_name_is_the_baseline(tmp_path: Path) -> None:
     (line,) = [entry for entry in moved.changes.entries if entry.subject == "R" and entry.kind == "open"]
     assert line.edits[0] == "“n does g” was “x > 1”, is “x > 2”"
     assert "was “x &gt; 1”, is “x &gt; 2”" in render_answers(moved)
+
+
+def test_the_page_shows_the_signed_sentence(tmp_path: Path) -> None:
+    """Also after a run that makes no answer again, and if today's sentence has other words."""
+    found = made()
+    said = found.answers.statement.replace("I know of", "I knew of")
+    later = replace(found, answers=replace(found.answers, statement=said))
+    path = signed(tmp_path, found=later)
+    baseline, _ = newest_signed(tmp_path / "signed", "rover")
+    rerun = case(SUBJECT, [G], [evidence(G, run="earlier")], baseline=baseline)
+    assert json.loads(base64.b64decode(json.loads(path.read_text())["payload"]))["predicate"]["says"] == said
+    for again in (made(baseline=baseline), rerun):
+        assert (again.changes.entries, again.answers.statement) == ((), said)
+        texts = dict(every_text(again))
+        assert f"<p>{said}</p>" in texts["index.html"]
+        assert recounted(texts["index.html"], texts["report.json"].encode()) == []
+    worse = made(Verdict.REFUTED, baseline)
+    assert "I know of" in worse.answers.statement
 
 
 def test_the_newest_that_verifies_counts(tmp_path: Path) -> None:
