@@ -82,7 +82,7 @@ MEANINGS = {
     Level.TESTS: "something below is sampled: tests, recordings or measurements",
     Level.TESTED_MODELS: "something below is sampled, and something is of a model only; the program may differ",
     Level.ARGUED: "a person vouches for the sentence or for a guarantee below",
-    Level.NOT_SHOWN: "evidence is missing or stale, the requirement is not validated, or a claim below is not shown",
+    Level.NOT_SHOWN: "evidence is missing or stale, it is not validated, or a claim below is not shown or refuted",
     Level.REFUTED: "there is a counterexample",
     Level.EXAMINED: "known-bad material, or a plan that names no requirement",
 }

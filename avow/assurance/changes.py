@@ -20,7 +20,7 @@ from avow.evidence.status import Status
 KINDS = ("open", "gone", "weaker", "meaning", "expired", "assumption", "deficit", "new", "better")
 """Worst first."""
 MARKS = {"open": "✘", "better": "▲", "meaning": "≠", "new": "+"}
-EDITED = 40
+EDITED = 60
 """Characters of a formula, old or new, in a line about its edit; the row of the change has it in full."""
 _RANK = {level: -at for at, level in enumerate(Level)}
 
@@ -34,7 +34,7 @@ def baseline_of(case: Case, name: str = "", who: str = "", signed_on: str = "", 
         until=until,
         content="",
         verdict=case.answers.verdict,
-        requirements=tuple((r.id, r.meaning, r.level.value, r.formal) for r in case.requirements),
+        requirements=tuple((r.id, r.meaning, r.level.value, _formula(r, case.obligations)) for r in case.requirements),
         guarantees=tuple(map(_guarantee, case.guarantees)),
         assumptions=tuple((s.key, s.words, s.until) for s in case.assumptions),
         deficits=tuple((w.key, w.count) for w in case.deficits),
@@ -85,7 +85,7 @@ def changes(
     then = {item[0]: item for item in old.guarantees}
     titles = {view.id: view.obligation.claim for view in guarantees}
     below = list(_guarantees(then, now, titles))
-    asked = {r.id: (r.meaning, r.level, r.formal, r.closure) for r in requirements}
+    asked = {r.id: (r.meaning, r.level, _formula(r, views), r.closure) for r in requirements}
     feared = {f"hazard {h.hazard.id}": (h.meaning, h.level, h.meaning, h.closure) for h in hazards}
     before = {name: (meaning, level, formal) for name, meaning, level, formal in old.requirements}
     before |= {f"hazard {name}": (meaning, level, meaning) for name, meaning, level in old.hazards}
@@ -105,7 +105,8 @@ def changes(
 
 
 def _edit(what: str, before: str, after: str) -> str:
-    """``REQ1 was “in.r < 120”, is “in.r < 130”``: the formulas from two words before their difference to its end."""
+    """``REQ1 was “in.r < 120”, is “in.r < 130”``: of both formulas the part that differs, from two words before it,
+    and with whole parentheses."""
     was, now = before.split(), after.split()
     if was == now or not was or not now:
         return f"{what} means something else"
@@ -114,8 +115,24 @@ def _edit(what: str, before: str, after: str) -> str:
     same = zip(reversed(was[start:]), reversed(now[start:]), strict=False)
     end = sum(1 for _ in takewhile(lambda pair: pair[0] == pair[1], same))
     first = max(0, start - 2)
+    while ((more := _closing(was, first, end) + _closing(now, first, end)) > 0 and first) or (more < 0 and end):
+        first, end = (first - 1, end) if more > 0 else (first, end - 1)
     old, new = (cut(" ".join(text[first : len(text) - end]), EDITED) for text in (was, now))
     return f"{what} was “{old}”, is “{new}”"
+
+
+def _closing(words: Sequence[str], first: int, end: int) -> int:
+    """How many more parentheses close in a part than open."""
+    part = "".join(words[first : len(words) - end])
+    return part.count(")") - part.count("(")
+
+
+def _formula(requirement: RequirementView, views: Sequence[ObligationView]) -> str:
+    """A requirement's formula with the values of constants; else as its plan states it."""
+    own = {
+        v.obligation.formula for v in views if v.id in requirement.obligations and v.obligation.name == requirement.id
+    }
+    return "; ".join(sorted(own - {""})) or requirement.formal
 
 
 def _guarantee(view: ObligationView) -> tuple[str, str, str, str, str]:
@@ -141,7 +158,7 @@ def _levels(
         if level is not was:
             kind = "better" if _RANK[level] > _RANK[was] else "weaker" if level.holds else "open"
             yield ChangeLine(kind, name, f"{name} was {was}, and is {level}", was.value, level.value)
-        if meaning != old_meaning:
+        if (meaning, formula) != (old_meaning, old_formula):
             yield ChangeLine("meaning", name, _edit(name, old_formula, formula), old_formula, formula)
     for name in (name for name in then if name not in now):
         yield ChangeLine("gone", name, f"{name} is not there any more", then[name][1], "")

@@ -11,7 +11,7 @@ from itertools import combinations
 from avow.assurance.facts import Facts
 from avow.assurance.model import Currency, MethodInfo, ObligationView, Suggestion
 from avow.assurance.naming import short
-from avow.assurance.policy import Demand, Policy, asked_of, costs
+from avow.assurance.policy import CRITICALITIES, Demand, Policy, asked_of, costs
 from avow.assurance.relied import judgements
 from avow.base.graphs import components
 from avow.base.persons import one_person
@@ -178,7 +178,9 @@ def suggest(view: ObligationView, demand: Demand | None, facts: Facts) -> Sugges
     match view.status:
         case Status.REFUTED:
             known = next((str(r.details["next"]) for r in view.records if "next" in r.details), "")
-            text = f"repair what the counterexample of {short(view.id)} shows, or accept it with a dated reason"
+            severe = view.obligation.kind is Kind.GUARANTEE and view.criticality == CRITICALITIES[0]
+            accept = "" if severe else ", or accept it with a dated reason"
+            text = f"repair what the counterexample of {short(view.id)} shows{accept}"
             return Suggestion(known or text, cost=-2)  # what is wrong comes before what is lacking
         case Status.CONTRADICTORY:
             return Suggestion(f"{short(view.id)}: {_two_answers(view)}", cost=-2)

@@ -358,7 +358,7 @@ def _standing(requirement: RequirementView, status: Status, good: Sequence[Statu
     """The reason why it does not count; one that would hold by its own evidence may still rest on what has failed or
     expired."""
     if requirement.outdated:
-        return "not validated: its sentence, formula or support was changed since a person read them"
+        return "not validated (its sentence, formula or support changed since a person read them: run `avow validate`)"
     if status not in good:
         return _short_of(status, good)
     return "open" if requirement.failing else "open: an assumption has expired"

@@ -691,7 +691,10 @@ def test_hazards_and_gates_that_changed_since_the_signature_have_a_line_each() -
     assert ("open", "hazard H1 was shown of models, and is refuted") in found
     assert ("open", "gate “Every hazard has mitigations, and all of them hold”: passes → fails") in found
     found = lines(subject(PROSE, hazards=[replace(fire, severity="marginal")], policy="reproduction"), first)
-    assert ("meaning", "hazard H1 was “It burns (critical;”, is “It burns (marginal;”") in found
+    assert (
+        "meaning",
+        "hazard H1 was “It burns (critical; mitigated by a.g)”, is “It burns (marginal; mitigated by a.g)”",
+    ) in found
     assert ("gone", "hazard H2 is not there any more") in found
     assert any(kind == "gone" and words.endswith("passes → not asked any more") for kind, words in found)
     earlier = replace(signed, hazards=(), gates=())

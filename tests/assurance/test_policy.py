@@ -642,3 +642,14 @@ def test_a_requirement_that_says_nothing_is_red_though_a_person_accepts_it() -> 
     found = case(subject, [guarantee("n", "g"), own], [evidence("n.g"), says_nothing])
     assert found.good
     assert (found.answers.headline, found.answers.tone) == (Level.NOT_SHOWN, Tone.RED)
+
+
+
+
+@pytest.mark.parametrize(("criticality", "offered"), [("high", False), ("low", True)])
+def test_a_refuted_guarantee_of_high_criticality_is_to_be_repaired(criticality: str, offered: bool) -> None:
+    target = guarantee("n", "g")
+    subject = system({"n": ["g"]}, plans=[node_plan("n", criticality, "hoare")])
+    (view,) = case(subject, [target], [evidence(target, Verdict.REFUTED)]).guarantees
+    assert view.suggestion is not None
+    assert ("accept it" in view.suggestion.text) == offered

@@ -9,17 +9,20 @@ from datetime import date
 from pathlib import Path
 
 import pytest
-from assurance.sample import case, evidence, guarantee, system
+from assurance.sample import case, evidence, guarantee, obligation, system
 from click.testing import CliRunner
 from helpers import every_text
 
 from avow.assurance.answers import Baseline
+from avow.assurance.changes import baseline_of
 from avow.assurance.model import Case
 from avow.assurance.signed import newest_signed, sign_case
 from avow.base.diagnostics import Rejected
+from avow.base.files import sha256
 from avow.base.verdict import Verdict
 from avow.cli.diff import command as diff
 from avow.evidence.envelope import seal, unseal
+from avow.evidence.obligation import SYSTEM_LEVEL, Kind
 from avow.evidence.signing import new_key_pair
 from avow.recount import recounted
 from avow.report import render_all
@@ -28,6 +31,7 @@ from avow.system.plan import Requirement
 
 G = guarantee("n", "g", "n does g", "x > 1")
 SUBJECT = system({"n": ["g"]}, requirements=[Requirement("R", "It is safe.", None, None, ("n.g",))])
+OWN = obligation(SYSTEM_LEVEL, Kind.REQUIREMENT, "R")
 TODAY, LAST = date(2026, 11, 21), date(2027, 11, 21)
 
 
@@ -60,6 +64,28 @@ def test_a_signature_by_name_is_the_baseline(tmp_path: Path) -> None:
     (line,) = [entry for entry in moved.changes.entries if entry.subject == "R" and entry.kind == "open"]
     assert line.edits[0] == "“n does g” was “x > 1”, is “x > 2”"
     assert "was “x &gt; 1”, is “x &gt; 2”" in render_answers(moved)
+
+
+def test_a_constant_of_a_requirement_is_a_change_of_its_meaning() -> None:
+    """The requirement's own words stay the same; the excerpt has whole parentheses."""
+    asked = Requirement("R", "It is safe.", "n.x >= Margin * (n.y + 1)", None, ("n.g",))
+    subject = system({"n": ["g"]}, requirements=[asked])
+
+    def resolved(text: str) -> Case:
+        own = replace(OWN, formula=text, digest=sha256(text))
+        return case(subject, [G, own], [evidence(G), evidence(own, Verdict.PROVED, "compose")])
+
+    old, new = "n.x ≥ (2 + 1 + n.y) · 5 ∧ n.y < 1", "n.x ≥ (2 + 1 + n.y) · 4 ∧ n.y < 1"
+    before = resolved(old)
+    after = case(
+        subject,
+        [G, replace(OWN, formula=new, digest=sha256(new))],
+        [evidence(G)],
+        baseline=baseline_of(before),
+    )
+    (line,) = [entry for entry in after.changes.entries if entry.kind == "meaning"]
+    assert (line.subject, line.before, line.after) == ("R", old, new)
+    assert line.words == "R was “(2 + 1 + n.y) · 5”, is “(2 + 1 + n.y) · 4”"
 
 
 def test_the_page_shows_the_signed_sentence(tmp_path: Path) -> None:
