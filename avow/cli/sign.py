@@ -46,6 +46,10 @@ def command(name: str, who: str, until: str, key: object, as_json: bool) -> int:
         raise Rejected(Diagnostic("SIGN005", f"--until: {until} is past"))
     if why := unreadable(" ".join(who.split())):
         raise Rejected(Diagnostic("SIGN005", f"--as: {who!r} is no person's name: {why}"))
+    if bare := [s.number for s in case.assumptions if not s.says]:
+        click.echo(f"warning: accepted without plain words: {', '.join(bare)}", err=True)
+    if (first := min((s.until for s in case.assumptions if s.until), default=until)) < until:
+        click.echo(f"warning: the signature ends on {until}, the first assumption on {first}", err=True)
     ledger = place.ledger(case.system)
     wrong = check(folder, Ledger(ledger) if ledger.exists() else None, place.root)
     wrong += tuple(f"{path} has changed since the evidence was made" for path in stale(case, place.root))

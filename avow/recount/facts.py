@@ -143,6 +143,7 @@ class Facts:
             "unvalidated": sum(not r.get("validated") for r in self.requirements),
             "bounded": sum(bool(r.get("bounded")) and r["level"] in HOLDS for r in self.requirements),
             "bare": sum(_words(f"{a['because']} {a['text']}") <= _words(a["says"]) for a in self.assumptions),
+            "wordless": sum(not a["says"] for a in self.assumptions),
             "unowned": len(self.assumptions) - len(self.owned_ones()),
             "unanswered": sum(any(r["bound"].get("unanswered") for r in records(v)) for v in (*within, *own)),
             "nan": sum(any(r["details"].get("no numbers") for r in records(v)) for v in (*within, *own)),

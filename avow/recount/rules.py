@@ -36,6 +36,7 @@ _DEFICITS = {
     "requirements? within bounds only": "bounded",
     "assumptions? without owner or end": "unowned",
     "assumptions? without a reason": "bare",
+    "assumptions? without plain words": "wordless",
     "claims? sampled, not proved": "sampled",
     "claims? with unanswered inputs": "unanswered",
     "claims? broken by NaN or infinity": "nan",

@@ -307,8 +307,9 @@ def test_without_owner_or_date_an_assumption_weakens() -> None:
     found = build(listed, formal=True)
     assert found.answers.tone is Tone.AMBER
     assert NO_WORDS in [s.words for s in found.assumptions]
-    unowned = {w.key: w.claims for w in found.deficits}["unowned"]
-    assert set(unowned) == {s.key for s in found.assumptions if not s.owned}
+    claims = {w.key: w.claims for w in found.deficits}
+    assert set(claims["unowned"]) == {s.key for s in found.assumptions if not s.owned}
+    assert claims["wordless"] == tuple(s.key for s in found.assumptions if s.words == NO_WORDS)
     shown = replace(found.requirements[0], level=Level.SHOWN, tone=Tone.AMBER, bounded=False, rate=None, searched="")
     assert shown.noted == "an assumption has no owner or end"
     assert replace(shown, tone=Tone.GREEN).noted == ""

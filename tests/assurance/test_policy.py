@@ -644,8 +644,6 @@ def test_a_requirement_that_says_nothing_is_red_though_a_person_accepts_it() -> 
     assert (found.answers.headline, found.answers.tone) == (Level.NOT_SHOWN, Tone.RED)
 
 
-
-
 @pytest.mark.parametrize(("criticality", "offered"), [("high", False), ("low", True)])
 def test_a_refuted_guarantee_of_high_criticality_is_to_be_repaired(criticality: str, offered: bool) -> None:
     target = guarantee("n", "g")

@@ -21,6 +21,7 @@ from avow.base.diagnostics import Rejected
 from avow.base.files import sha256
 from avow.base.verdict import Verdict
 from avow.cli.diff import command as diff
+from avow.cli.sign import command as sign
 from avow.evidence.envelope import seal, unseal
 from avow.evidence.obligation import SYSTEM_LEVEL, Kind
 from avow.evidence.signing import new_key_pair
@@ -104,6 +105,30 @@ def test_the_page_shows_the_signed_sentence(tmp_path: Path) -> None:
         assert recounted(texts["index.html"], texts["report.json"].encode()) == []
     worse = made(Verdict.REFUTED, baseline)
     assert "I know of" in worse.answers.statement
+
+
+def test_signing_warns_of_assumptions_without_words_and_of_an_end_before_its_own(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("avow.cli.sign.check", lambda *_: ())
+    monkeypatch.setattr("avow.cli.sign.stale", lambda *_: ())
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "contracts").mkdir()
+    (tmp_path / "dodo.py").touch()
+    found = made()
+    first, *rest = found.assumptions
+    told = replace(found, assumptions=(replace(first, says="", until="2027-01-01"), *rest))
+    render_all(told, tmp_path / "reports" / "rover")
+
+    def warned(until: str) -> str:
+        arguments = ("--report", "reports/rover", "--as", "A. Person", "--until", until)
+        done = CliRunner().invoke(sign, arguments, standalone_mode=False)
+        assert done.exception is None, done.exception
+        return done.stderr
+
+    assert f"without plain words: {first.number}\n" in warned("2027-01-01")
+    assert "the first assumption" not in warned("2027-01-01")
+    assert "ends on 2027-01-02, the first assumption on 2027-01-01" in warned("2027-01-02")
 
 
 def test_the_newest_that_verifies_counts(tmp_path: Path) -> None:
