@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 LEAST_CONFIDENCE = Fraction(9, 10)
 """Below it, a rate is no evidence that a policy's limit is met."""
 
-NO_RATE = "failure rate unknown"
+NO_RATE = "failure rate in use unknown"
 _SAMPLED = (Status.TESTED, Status.MONITORED)
 
 _TRIALS = {
@@ -67,9 +67,7 @@ class RateView:
         if not self.bound:
             return f"failure rate of the requirement unknown, as {self.why}"
         if Fraction(self.bound) >= 1:
-            return (
-                f"failure rate unknown: {count(len(self.leaves), 'sampled claim')} together show no bound below 100 %"
-            )
+            return f"{NO_RATE}: {count(len(self.leaves), 'sampled claim')} together show no bound below 100 %"
         if len(self.leaves) < 2:
             return f"failure rate: {self.brief} ({_TRIALS[self.trial]})"
         how = f"union bound over {len(self.leaves)} sampled claims, joint confidence by Bonferroni"

@@ -100,11 +100,12 @@ def _because(case: Case, r: RequirementView) -> str:
             return "Not shown: see what fails below."
         case Level.REFUTED:
             return "Refuted: the contracts allow a counterexample."
-        case _:  # every other level is derived
+        case _:  # every other level is derived, or sampled by a search
             within = ", within finite bounds that the evidence names" if r.bounded else ""
             every = not r.supported_by and {view.id for view in case.guarantees} <= set(r.rests_on)
             named = " The plan names no guarantee below it: it counts as resting on all of them." if every else ""
-            return f"{str(r.level).capitalize()}: {MEANINGS[r.level]}. A tool derived it{within}.{named}"
+            how = f"Nothing refutes it: {r.searched}" if r.searched else f"A tool derived it{within}"
+            return f"{str(r.level).capitalize()}: {MEANINGS[r.level]}. {how}.{named}"
 
 
 def _strategy(case: Case, r: RequirementView, nodes: int) -> str:

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from helpers import every_text
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -565,6 +566,11 @@ def test_deficits_are_of_all_that_the_page_shows() -> None:
     expected = {"open": 2, "premises": 1, "models": 1, "sampled": 1, "advice": 1}
     assert {key: number.get(key) for key in expected} == expected
     assert found.requirements[0].searched == "searched to step 52, not exhaustively"
+    argued = dict(every_text(found))["argument.html"]
+    assert ("A tool derived it" in argued, "Nothing refutes it: searched to step 52" in argued) == (
+        False,
+        found.requirements[0].level.holds,
+    )
 
 
 @pytest.mark.parametrize(
@@ -646,7 +652,7 @@ def test_requirements_on_another_guarantee_of_the_weakest_node_are_counted_besid
         assert view.weakest is not None
         assert set(view.weakest.claims) in ({node[0].id}, set())
         assert view.weakest.name in ("a.g", "R1"), "as the weakest evidence of the whole case"
-    assert whole.answers.verdict == "Argued (failure rate unknown)"
+    assert whole.answers.verdict == "Argued (failure rate in use unknown)"
     alone = case(system({"a": ["g"]}, requirements=asked[:1]), node[:1], made[:1]).answers.weakest
     assert alone is not None
     assert alone.others == ""

@@ -21,11 +21,11 @@ EXAMPLES = ROOT / "docs/examples"
 TOOLS = ("clang", "strace", "dafny")
 """The recorded verdicts of the examples are those of a machine that has these."""
 VERDICTS = {
-    "warehouse": "Shown by tests of models (failure rate unknown)",
+    "warehouse": "Shown by tests and of models (failure rate in use unknown)",
     "ventilator": "Shown of models",
-    "geofence": "Shown by tests of models (failure rate unknown)",
-    "rover": "Shown by tests of models (at most 14 % of runs fail, at 95 % confidence)",
-    "docking": "Shown by tests of models (failure rate unknown)",
+    "geofence": "Shown by tests and of models (failure rate in use unknown)",
+    "rover": "Shown by tests and of models (at most 14 % of runs fail, at 95 % confidence)",
+    "docking": "Shown by tests and of models (failure rate in use unknown)",
 }
 
 
