@@ -333,33 +333,3 @@ def test_the_caret_is_under_what_is_wrong(file: str, good: str, bad: str, shown:
     line = (folder / file).read_text().splitlines()[found["line"] - 1]
     end = found["end_column"] - 1 if found["end_line"] == found["line"] else None
     assert line[found["column"] - 1 : end] == shown
-
-
-def test_a_fault_elsewhere_makes_no_second_one_of_a_value_in_a_parameter_file(tmp_path: Path) -> None:
-    texts = {
-        "system.rcl": """node n { inputs( r : REAL, parameter limit : REAL ) outputs( b : BOOL )
-          topics( std_msgs/Float64 r matches(in.r), std_msgs/Bool b matches(out.b) )
-          assume small ( 0 < in.limit < 1 ) guarantee g ( out.b <=> in.r > in.limit ) }""",
-        "plan.yaml": """hazardz: none
-ros: {distro: humble}
-nodes: {n: {source: {python: n.py, class: N, kind: rclpy, parameters: n.yaml}, methods: [hypothesis]}}""",
-        "n.yaml": "n: {ros__parameters: {limit: 0.5}}\n",
-        "n.py": """import rclpy
-from rclpy.node import Node
-from std_msgs.msg import Bool, Float64
-
-
-class N(Node):
-    def __init__(self):
-        super().__init__("n")
-        self.limit = self.declare_parameter("limit", 0.5).value
-        self.out = self.create_publisher(Bool, "b", 1)
-        self.create_subscription(Float64, "r", self.hear, 1)
-
-    def hear(self, message):
-        self.out.publish(Bool(data=message.data > self.limit))
-""",
-    }
-    for name, text in texts.items():
-        (tmp_path / name).write_text(text, encoding="utf-8")
-    assert check(tmp_path) == [("plan.yaml", "PLAN103")]
