@@ -129,8 +129,10 @@ def answers(
     by_level = tuple((level, number[level]) for level in _WORST_FIRST if number[level])
     asked = [gate for gate in gates if not gate.idle]
     good = sum(gate.passed for gate in asked)
-    idle = f", {len(gates) - len(asked)} not asked" if len(asked) < len(gates) else ""
-    idle += " of known-bad material" if idle and strict else ""
+    relaxed = sum(gate.relaxed for gate in asked)
+    idle = f", {relaxed} relaxed by the plan" if relaxed else ""
+    idle += f", {len(gates) - len(asked)} not asked" if len(asked) < len(gates) else ""
+    idle += " of known-bad material" if len(asked) < len(gates) and strict else ""
     kinds = len(deficits)
     by_node: dict[str, list[ObligationView]] = {node.name: [] for node in nodes}
     for view in views:

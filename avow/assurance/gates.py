@@ -180,7 +180,7 @@ def _nothing_wrong(facts: Facts, obligations: Sequence[ObligationView], excused:
 def _held_to(name: str, title: str, views: Sequence[ObligationView], good: Sequence[Status], excused: set[str]) -> Gate:
     """A gate: each of some claims has a status that the policy accepts; if the policy names no status, it asks
     nothing."""
-    return _gate(
+    found = _gate(
         name,
         title,
         [v for v in views if good and v.status not in good],
@@ -190,6 +190,7 @@ def _held_to(name: str, title: str, views: Sequence[ObligationView], good: Seque
         _in_words(good),
         idle=not good,
     )
+    return replace(found, relaxed=not all(status.supports for status in good))
 
 
 def _not_run(views: Sequence[ObligationView], good: Sequence[Status]) -> str:

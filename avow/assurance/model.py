@@ -391,6 +391,8 @@ class Gate:
     """It fails only because a tool is missing or broke (exit code 3)."""
     idle: bool = False
     """The policy asks nothing here: that the gate does not fail has no meaning."""
+    relaxed: bool = field(default=False, metadata=codec.LATER)
+    """The plan's policy accepts statuses that support nothing, as no profile does."""
 
     @property
     def state(self) -> str:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 
+from avow.assurance.answers import Level
 from avow.assurance.hazards import HazardView
 from avow.assurance.model import Gate, ObligationView, RequirementView, Suggestion
 from avow.assurance.naming import requirement_claim
@@ -34,10 +36,16 @@ def hazards_gate(hazards: Sequence[HazardView]) -> Iterable[Gate]:
         "hazards",
         "Every hazard has mitigations, and all of them hold",
         not reasons,
-        "; ".join(reasons) or f"{count(len(hazards), 'hazard')} mitigated",
+        "; ".join(reasons) or f"{count(len(hazards), 'hazard')} mitigated: {_how_far(hazards)}",
         tuple(claims) or tuple(view.hazard.id for view in bare),
         tuple(remedies),
     )
+
+
+def _how_far(hazards: Sequence[HazardView]) -> str:
+    """``1 shown of models, 2 shown by tests``."""
+    number = Counter(view.level for view in hazards)
+    return ", ".join(f"{number[level]} {level}" for level in Level if number[level])
 
 
 def rates_gate(

@@ -67,7 +67,9 @@ def _rule(section: str, pattern: str, numbers: Callable[[Facts, re.Match[str], B
 
 def _gates(facts: Facts, _match: re.Match[str], _block: Block) -> _Numbers:
     idle = len(facts.case["gates"]) - len(facts.gates)
-    return str(sum(g["passed"] for g in facts.gates)), str(len(facts.gates)), str(idle) if idle else None
+    relaxed = sum(bool(g.get("relaxed")) for g in facts.gates)
+    some = tuple(str(number) if number else None for number in (relaxed, idle))
+    return str(sum(g["passed"] for g in facts.gates)), str(len(facts.gates)), *some
 
 
 def _level(facts: Facts, match: re.Match[str], _block: Block) -> _Numbers:
@@ -303,7 +305,11 @@ RULES = (
     _rule("", r"(\d+) kinds? of assurance deficit", _kinds),
     _rule("head", r"Refuted: ([^␟]*?)(?: and (\d+) more)?(?=; | $| · |[ ,] ?\d| WARNED)", _listed),
     _rule("q6", r"All (\d+) kinds?", _kinds),
-    _rule("head", r"policy: (\d+) of (\d+) gates? pass(?:es)?(?:, (\d+) not asked)?", _gates),
+    _rule(
+        "head",
+        r"policy: (\d+) of (\d+) gates? pass(?:es)?(?:, (\d+) relaxed by the plan)?(?:, (\d+) not asked)?",
+        _gates,
+    ),
     _rule("head", rf"(\d+) ({_LEVELS})(?= [·␟]|, | $)", _level),
     _rule("q1", rf"^ ␟ (\d+) ({_LEVELS}) ␟ (.*?) $", _named),
     _rule("q1", r"^ (␟ .* ␟ )(\d+) $", _row),

@@ -13,7 +13,7 @@ from random import Random
 
 import pytest
 from assurance.sample import case as make_case
-from assurance.sample import evidence, guarantee, keys_of, node_plan, system
+from assurance.sample import evidence, guarantee, keys_of, node_plan, obligation, system
 from assurance.test_rates import sampled, three
 from helpers import every_text
 
@@ -24,6 +24,7 @@ from avow.assurance.model import Case
 from avow.base.files import sha256
 from avow.base.verdict import Counterexample, Object, Verdict
 from avow.evidence.ledger import Ledger
+from avow.evidence.obligation import Kind, ProgramClaim
 from avow.kernel.rates import tail
 from avow.pipeline.report_check import check
 from avow.recount import NUMBER, recounted
@@ -67,11 +68,14 @@ def weakened() -> Case:
 
 
 def mixed() -> Case:
-    """A hazard with a mitigation that is tested and one that is proved of a model."""
+    """A hazard with a mitigation that is tested and one that is proved of a model; a gate that the plan relaxes."""
     a, b = guarantee("a", "g"), guarantee("b", "g")
-    subject = system({"a": ["g"], "b": ["g"]}, hazards=[Hazard("H", "It burns", "critical", mitigated_by=("b", "a"))])
+    hazard = Hazard("H", "It burns", "critical", mitigated_by=("b", "a"))
+    relaxed = {"profile": "default", "programs": ["tested", "not-run"]}
+    subject = system({"a": ["g"], "b": ["g"]}, hazards=[hazard], policy=relaxed)
+    runs = obligation("a", Kind.PROGRAM, ProgramClaim.FAULTLESS)
     records = [evidence(a, Verdict.TESTED, "hypothesis", of=Object.SOURCE), evidence(b)]
-    return make_case(subject, [a, b], records)
+    return make_case(subject, [a, b, runs], [*records, evidence(runs, Verdict.NOT_RUN, "fuzz")])
 
 
 CASES: dict[str, Callable[[], Case]] = {
@@ -123,6 +127,12 @@ def test_any_number_of_tools_is_borne_out(number: int) -> None:
     many = f"and {number - 5} more)"
     assert (many in page) == (number > 5)
     assert number < 6 or recounted(page.replace(many, f"and {number - 4} more)"), data) != []
+
+
+def test_a_gate_that_the_plan_relaxes_is_named() -> None:
+    page, data = made("mixed")
+    assert "gates pass, 1 relaxed by the plan" in " ".join(page.split())
+    assert recounted(page.replace("1 relaxed", "2 relaxed"), data)
 
 
 def test_another_report_json_is_named_as_such() -> None:

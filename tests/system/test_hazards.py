@@ -122,6 +122,7 @@ def test_a_hazard_is_as_well_mitigated_as_its_weakest_mitigation(
     (gate,) = [gate for gate in found.gates if gate.id == "hazards"]
     assert gate.passed is passes
     assert ("H1" in gate.reason) is not passes
+    assert (f"1 hazard mitigated: 1 {level}" == gate.reason) is passes
     assert (found.exit_code == 0) <= passes
 
 
