@@ -39,6 +39,7 @@ _NEEDS = {
     "needs_dot": lambda: shutil.which("dot") is not None,
     "needs_latex": lambda: shutil.which("pdflatex") is not None,
     "needs_pacti": lambda: importlib.util.find_spec("pacti") is not None,
+    "needs_perception": lambda: all(map(importlib.util.find_spec, ("maraboupy", "onnx", "onnxruntime"))),
     "needs_ros1": lambda: _runs("/usr/bin/python3", "-c", "import diagnostic_msgs, rosmaster, rospy"),
     "needs_roscpp": lambda: shutil.which("g++") is not None and _runs("pkg-config", "--exists", "roscpp"),
 }

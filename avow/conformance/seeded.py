@@ -31,8 +31,8 @@ class Seeded:
     """The method's options, as in plan.yaml."""
     verdicts: Mapping[str, Verdict]
     """Guarantee → its correct verdict. A guarantee left out is not given to the method."""
-    files: Mapping[str, str] = field(default_factory=dict)
-    """Path in the system's folder → text: programs, data, mappings. The answer depends on each of them."""
+    files: Mapping[str, str | bytes] = field(default_factory=dict)
+    """Path in the system's folder → text or bytes: programs, data, mappings. The answer depends on each of them."""
     plan: Mapping[str, Any] = field(default_factory=dict)
     """More keys of plan.yaml: a scenario, connections, …"""
     declared: Mapping[str, Any] = field(default_factory=dict)
@@ -89,7 +89,7 @@ class Seeded:
             contract=text(self.contract),
             options=value(self.options),
             verdicts={text(name): verdict for name, verdict in self.verdicts.items()},
-            files={text(name): text(content) for name, content in self.files.items()},
+            files={text(name): value(content) for name, content in self.files.items()},
             plan=value(self.plan),
             declared=value(self.declared),
         )

@@ -15,6 +15,7 @@ from avow.backends.experiment import BACKEND as EXPERIMENT
 from avow.backends.fuzz import BACKEND as FUZZ
 from avow.backends.hoare import BACKEND as HOARE
 from avow.backends.hypothesis import BACKEND as HYPOTHESIS
+from avow.backends.onnx import BACKEND as ONNX
 from avow.backends.python import BACKEND as PYTHON
 from avow.backends.review import BACKEND as REVIEW
 from avow.backends.review.stamp import stamp
@@ -248,6 +249,46 @@ class TestExperiment(Conformance):
             one_refuted(Verdict.TESTED),
             {"runs.csv": RUNS + "x,130,no\n"},
         ),
+    )
+
+
+def network(limit: float) -> bytes:
+    """The rate minus the limit; no network where the extra is missing, so that nothing is run either."""
+    try:
+        from onnx import TensorProto, helper
+    except ImportError:
+        return b""
+    pairs = ("w", 1.0), ("b", -limit)
+    held = [helper.make_tensor(name, TensorProto.FLOAT, [1, 1], [value]) for name, value in pairs]
+    ends = [helper.make_tensor_value_info(name, TensorProto.FLOAT, [1, 1]) for name in ("x", "y")]
+    graph = helper.make_graph([helper.make_node("Gemm", ["x", "w", "b"], ["y"])], "net", ends[:1], ends[1:], held)
+    made: bytes = helper.make_model(
+        graph, ir_version=8, opset_imports=[helper.make_opsetid("", 13)]
+    ).SerializeToString()
+    return made
+
+
+@pytest.mark.needs_perception
+class TestOnnx(Conformance):
+    backend = ONNX
+    seeded = tuple(
+        Seeded(
+            name,
+            CONTRACT,
+            {
+                "network": "net.onnx",
+                "inputs": {"in.r": 0},
+                "outputs": {"out.high": {"index": 0, "threshold": 0}},
+                "box": {"in.r": [0, 500]},
+            },
+            verdicts,
+            {"net.onnx": network(limit)},
+            SCENARIO,
+        )
+        for name, limit, verdicts in (
+            ("right", 100.0, both(Verdict.PROVED)),
+            ("wrong", 121.0, one_refuted(Verdict.PROVED)),
+        )
     )
 
 

@@ -1,0 +1,81 @@
+from __future__ import annotations
+
+from functools import partial
+from importlib.metadata import PackageNotFoundError
+from pathlib import Path
+
+from avow.backend_kit.given import file_path, summarized
+from avow.backend_kit.protocol import Backend, Job, Limits, Report, Tool
+from avow.base.codes import Catalogue
+from avow.base.diagnostics import Diagnostic, Rejected
+from avow.base.tools import package_version, works
+from avow.base.verdict import Link, Object, Verdict
+
+from .options import SCHEMA, read
+
+INSTALL = "pip install 'avow[perception]'"
+_TRIALS = {
+    "onnxruntime": "import onnxruntime; assert 'CPUExecutionProvider' in onnxruntime.get_available_providers()",
+    "maraboupy": "from maraboupy import MarabouCore as m; q = m.InputQuery(); q.setNumberOfVariables(1); "
+    "q.setLowerBound(0, 0); q.setUpperBound(0, 1); e = m.Equation(m.Equation.GE); e.addAddend(1, 0); e.setScalar(2); "
+    "q.addEquation(e); assert m.solve(q, m.Options())[0] == 'unsat'",
+}
+
+
+class OnnxBackend(Backend):
+    """See `docs/backends/onnx.md`."""
+
+    name = "onnx"
+    title = "Neural networks: interval bounds, Marabou, and runs in onnxruntime"
+    version = "1"
+    strength = Verdict.PROVED
+    link = Link.MAPPED
+    of = Object.MODEL
+    uses_scenario = False
+    uses_wiring = False
+    portable = True
+    not_run = "a network's inputs and outputs are float32"
+    options_schema = SCHEMA
+    codes = Catalogue("avow.backends.onnx")
+    green_means = (
+        "For every input that the assumptions allow, the network's outputs in exact reals meet the guarantee. It shows "
+        "nothing of the camera, of the code before and after the network, or of rounding in float32."
+    )
+
+    def tools(self) -> tuple[Tool, ...]:
+        return tuple(_tool(name, line) for name, line in _TRIALS.items())
+
+    def check(self, job: Job) -> tuple[Diagnostic, ...]:
+        try:
+            read(job)
+        except Rejected as rejected:
+            return rejected.diagnostics
+        return ()
+
+    def files(self, job: Job) -> tuple[Path, ...]:
+        path = file_path(job, "network")
+        return () if path is None else (path,)
+
+    def discharge(self, job: Job, folder: Path, limits: Limits) -> Report:
+        tools = self.tools()
+        version = ", ".join(f"{tool.name} {tool.version}" for tool in tools if tool.present) or self.version
+        if missing := [tool.name for tool in tools if not tool.present]:
+            why = f"{' and '.join(missing)} missing: {INSTALL}"
+            return Report.alike(job, Verdict.NOT_RUN, why, self.name, version)
+        try:
+            given = read(job)
+        except Rejected as rejected:
+            why = f"the network cannot be judged: {summarized(job, rejected.diagnostics)}"
+            return Report.alike(job, Verdict.ERROR, why, self.name, version)
+        from .settle import settle
+
+        outcomes, logs = settle(job, given, limits)
+        return Report(outcomes, self.name, version, logs=logs)
+
+
+def _tool(name: str, line: str) -> Tool:
+    try:
+        version = package_version(name)
+    except PackageNotFoundError:
+        return Tool(name, None, None, INSTALL, package=name)
+    return Tool(name, version, None, INSTALL, package=name, trial=partial(works, line))
