@@ -1,17 +1,19 @@
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping, Sequence
 from functools import partial
 from importlib.metadata import PackageNotFoundError
 from pathlib import Path
 
 from avow.backend_kit.given import file_path, summarized
-from avow.backend_kit.protocol import Backend, Job, Limits, Report, Tool
+from avow.backend_kit.protocol import Backend, Job, Limits, OutsideCheck, Report, Tool
 from avow.base.codes import Catalogue
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.tools import package_version, works
 from avow.base.verdict import Link, Object, Verdict
 
 from .options import SCHEMA, read
+from .vnnlib import SCALED, queries
 
 INSTALL = "pip install 'avow[perception]'"
 _TRIALS = {
@@ -55,6 +57,20 @@ class OnnxBackend(Backend):
     def files(self, job: Job) -> tuple[Path, ...]:
         path = file_path(job, "network")
         return () if path is None else (path,)
+
+    def export(self, job: Job) -> Mapping[str, str]:
+        """Each case of each denied guarantee, as a query in VNN-LIB; none if the input is at fault."""
+        try:
+            return {name: text for _, name, text in queries(job, read(job))}
+        except Rejected:
+            return {}
+
+    def outside_checks(self, job: Job, folder: Path, names: Sequence[str]) -> Iterable[OutsideCheck]:
+        network = file_path(job, "network")
+        assert network is not None
+        for guarantee, name, text in queries(job, read(job)):
+            if SCALED not in text:
+                yield OutsideCheck(folder / name, ("Marabou", network, folder / name), (guarantee,), "unsat")
 
     def discharge(self, job: Job, folder: Path, limits: Limits) -> Report:
         tools = self.tools()

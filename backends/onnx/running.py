@@ -19,6 +19,7 @@ from avow.language.sorts import TupleSort
 from .cases import Box, Side
 from .options import Argmax, Given, Scaled, Threshold
 from .reading import Network, Relu, Sum
+from .tuning import ALIKE
 
 Point = tuple[float, ...]
 """Inputs of the network, each a float32."""
@@ -38,20 +39,21 @@ class Runtime:
         self.points = 0
         self.difference = 0.0
         """The greatest difference so far between an output and its value from `reading`, computed in float64."""
-        self.relative = 0.0
-        """Likewise, as a share of 1 plus the value."""
 
-    def outputs(self, point: Point) -> Sequence[float]:
+    def outputs(self, point: Point) -> list[float]:
         tensor = np.array(point, dtype=np.float32).reshape(self._given.network.shape)
         found: list[float] = self._session.run(None, {self._name: tensor})[0].ravel().tolist()
-        known = values(self._given.network, point)
-        self.points += 1
-        if len(known) != len(found):
-            raise ValueError(f"onnxruntime has {len(found)} outputs, not {len(known)}")
-        for ours, theirs in zip(known, found, strict=True):
-            self.difference = max(self.difference, abs(ours - theirs))
-            self.relative = max(self.relative, abs(ours - theirs) / (1 + abs(ours)))
         return found
+
+    def compare(self, point: Point) -> bool:
+        """Whether the outputs are about those that `reading` has, computed in float64."""
+        known, found = values(self._given.network, point), self.outputs(point)
+        self.points += 1
+        if len(known) != len(found) or not np.isfinite(found).all():
+            return False
+        apart = [abs(ours - theirs) for ours, theirs in zip(known, found, strict=True)]
+        self.difference = max(self.difference, *apart)
+        return all(by <= ALIKE * (1 + abs(ours)) for by, ours in zip(apart, known, strict=True))
 
     def ports(self, node: Node, point: Point) -> dict[str, Value] | None:
         """The values of the connected ports; None if an output is not finite."""

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import random
+import subprocess
+import sys
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
@@ -204,7 +206,7 @@ def test_operators_as_in_onnxruntime(tmp_path: Path) -> None:
     found = read_network(path)
     runtime = Runtime(path, Given(found, {}, {}, (), ""))
     for _ in range(20):
-        runtime.outputs(tuple(draw.normal(size=25).astype(np.float32).tolist()))
+        assert runtime.compare(tuple(draw.normal(size=25).astype(np.float32).tolist()))
     assert runtime.difference < 1e-4
 
 
@@ -246,6 +248,38 @@ def test_broken_files(code: str, tmp_path: Path) -> None:
             except Rejected as error:
                 found |= {d.code for d in error.diagnostics}
     assert code in found
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("formula", "proved"),
+    [("out.z <= 3/2", True), ("out.z <= 1/2", False), ("out.z - in.x <= 3", True), ("out.z - in.x <= -5", False)],
+)
+def test_exported_queries_in_marabous_own_reader(formula: str, proved: bool, tmp_path: Path) -> None:
+    """The command of the index, with the same answer; Marabou then reads network and query itself."""
+    case = Seeded("n", ONE.format(formula), {**TWO, **ONE_OPTIONS}, {"g": Verdict.UNKNOWN}, {"net.onnx": TENT})
+    job = case.written(BACKEND, tmp_path / "system")
+    files = BACKEND.export(job)
+    for name, text in files.items():
+        (tmp_path / name).write_text(text)
+    found = BACKEND.outside_checks(job, tmp_path, tuple(files))
+    line = "from maraboupy.MarabouMain import main; main()"
+    said = [
+        subprocess.run([sys.executable, "-c", line, *check.command[1:]], capture_output=True, text=True, check=True)
+        for check in found
+    ]
+    assert said
+    assert all("unsat" in one.stdout.splitlines() for one in said) == proved
+
+
+def test_a_query_with_coefficients_has_no_command(tmp_path: Path) -> None:
+    case = Seeded(
+        "n", ONE.format("2 * out.z <= in.x + 3"), {**TWO, **ONE_OPTIONS}, {"g": Verdict.UNKNOWN}, {"net.onnx": TENT}
+    )
+    job = case.written(BACKEND, tmp_path)
+    (text,) = BACKEND.export(job).values()
+    assert "(assert (<= (+ (* -1.0 Y_0) (* 0.5 X_0)) -1.5))" in text
+    assert list(BACKEND.outside_checks(job, tmp_path, ("g-1.vnnlib",))) == []
 
 
 def test_without_the_extra_it_is_not_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
