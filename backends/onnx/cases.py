@@ -6,18 +6,19 @@ as not strict). If no case can be satisfied, the guarantee holds.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
 from itertools import product
 
+from avow.base.optional import complete
 from avow.formulas.cases import TooManyCases, lifted
 from avow.language import sorts as s
 from avow.language import terms as t
 from avow.language.printer import show_term
 
 from .options import Argmax, Given, Scaled, Threshold
-from .tuning import CASES
+from .tuning import CASES, ROUNDS
 
 Quantity = tuple[str, int]
 """``("X", 3)`` is input 3 of the network, ``("Y", 0)`` its output 0."""
@@ -199,7 +200,14 @@ def _possible(constraint: Constraint) -> bool:
 def _both(one: list[Case], other: list[Case]) -> list[Case]:
     if len(one) * len(other) > CASES:
         raise NotLinear(f"it has more than {CASES} cases")
-    return [(*a, *(each for each in b if each not in a)) for a in one for b in other]
+    return [(*a, *(each for each in b if each not in a)) for a in one for b in other if not _opposed(a, b)]
+
+
+def _opposed(one: Case, other: Case) -> bool:
+    """Whether two constraints contradict each other by their sum. Where a strict one is taken as not strict, Marabou
+    would not see it."""
+    sums = (Constraint(a.left.plus(b.left), a.strict or b.strict) for a in one for b in other)
+    return not all(map(_possible, sums))
 
 
 def _few(cases: list[Case]) -> list[Case]:
@@ -228,15 +236,22 @@ Box = tuple[tuple[Side | None, Side | None], ...]
 
 
 def box(case: Case, inputs: int) -> Box:
-    """What the constraints on single inputs say."""
+    """What the constraints on inputs say of each: a constraint bounds an input by the bounds of its others."""
     low: list[Side | None] = [None] * inputs
     high: list[Side | None] = [None] * inputs
-    for quantity, by, constraint in _single(case):
-        side = Side(-constraint.left.constant / by, constraint.strict)
-        sides, sign = (high, 1) if by > 0 else (low, -1)
-        known = sides[quantity]
-        if known is None or (sign * side.value, not side.strict) < (sign * known.value, not known.strict):
-            sides[quantity] = side
+    for constraint in case * ROUNDS:
+        terms = constraint.left.terms
+        for (_, k), by in terms.items() if all(kind == "X" for kind, _ in terms) else ():
+            rest = complete((low if each > 0 else high)[j] for (_, j), each in terms.items() if j != k)
+            if rest is None:
+                continue
+            others = (each for (_, j), each in terms.items() if j != k)
+            least = sum((each * side.value for each, side in zip(others, rest, strict=True)), constraint.left.constant)
+            side = Side(-least / by, constraint.strict)
+            sides, sign = (high, 1) if by > 0 else (low, -1)
+            known = sides[k]
+            if known is None or (sign * side.value, not side.strict) < (sign * known.value, not known.strict):
+                sides[k] = side
     return tuple(zip(low, high, strict=True))
 
 
@@ -246,10 +261,3 @@ def is_empty(sides: Box) -> bool:
         for low, high in sides
         if low is not None and high is not None
     )
-
-
-def _single(case: Case) -> Iterator[tuple[int, Fraction, Constraint]]:
-    for constraint in case:
-        match [*constraint.left.terms.items()]:
-            case [(("X", index), by)]:
-                yield index, by, constraint

@@ -19,3 +19,7 @@ solver's tolerance (1e-6) and the rounding of float32 (6e-8)."""
 ALIKE = 1e-3
 """The greatest difference between onnxruntime and the network as read, as a share of 1 plus the value, at which a proof
 counts: rounding in float32 makes some 1e-6."""
+
+ROUNDS = 3
+"""How often each constraint on inputs tightens their box: as many as a chain of comparisons has links. Marabou may take
+a minute for what this excludes at once."""

@@ -70,6 +70,7 @@ def run(folder: Path, formula: str, net: bytes, contract: str, **options: Any) -
         ("in.x + 1 > in.y -> out.kind == person", Verdict.REFUTED),
         ("(in.y >= 1.1 -> out.near) and (in.y <= 0.9 -> not out.near)", Verdict.PROVED),
         ("out.near <=> in.y > 1", Verdict.REFUTED),
+        ("not (out.near and max(in.x, in.y) < 0.9)", Verdict.PROVED),
         ("(if out.near then out.z else 0) <= 9", Verdict.REFUTED),
         ("2 * out.z - in.x / 2 <= 15", Verdict.PROVED),
     ],
@@ -232,14 +233,13 @@ def test_each_fault_is_reported(tmp_path: Path) -> None:
     ]
 
 
-@pytest.mark.parametrize("code", ["ONNX111", "ONNX113"])
-def test_broken_files(code: str, tmp_path: Path) -> None:
+def test_broken_files(tmp_path: Path) -> None:
     """Each file cut anywhere, and with a byte changed, is read or refused: nothing raises."""
     draw, found = random.Random(1), set()
     make = onnx.helper.make_node
     odd = graph([make("MatMul", ["in", "in"], ["out"])], [], [2, 2], "out")
     for data in (warner(1.0), odd):
-        for _ in range(300):
+        for _ in range(80):
             at = draw.randrange(len(data))
             cut = data[:at] if draw.random() < 0.3 else data[:at] + bytes([draw.randrange(256)]) + data[at + 1 :]
             (tmp_path / "net.onnx").write_bytes(cut)
@@ -247,7 +247,7 @@ def test_broken_files(code: str, tmp_path: Path) -> None:
                 read_network(tmp_path / "net.onnx")
             except Rejected as error:
                 found |= {d.code for d in error.diagnostics}
-    assert code in found
+    assert {"ONNX111", "ONNX113"} <= found
 
 
 @pytest.mark.slow
@@ -318,6 +318,26 @@ def test_bounds_hold_in_exact_arithmetic(tmp_path: Path) -> None:
 
 
 # -- against onnxruntime -----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(8))
+def test_verdicts_against_points(seed: int, tmp_path: Path) -> None:
+    """The limit is about the greatest of 10 000 outputs: what is proved holds at each of them."""
+    import numpy as np
+    import onnxruntime
+
+    draw = random.Random(100 + seed)
+    net = drawn(draw, 2, 5, 5, 2)
+    session = onnxruntime.InferenceSession(net)
+    points = np.random.default_rng(seed).uniform(0, 10, (10_000, 1, 2)).astype(np.float32)
+    greatest = max(float(session.run(None, {"in": point})[0][0, 0]) for point in points)
+    limit = greatest + draw.choice((-0.5, -0.01, 0.5, 5.0))
+    verdict = judged(tmp_path, f"out.z <= 0 + ({limit:.6f})", net).verdict
+    assert verdict is not Verdict.PROVED or greatest <= limit + 1e-4
+    assert verdict is Verdict.REFUTED or greatest <= limit
+    if limit > greatest + 4:
+        assert verdict is Verdict.PROVED
 
 
 @pytest.mark.slow
