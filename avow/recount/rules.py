@@ -17,7 +17,7 @@ from avow.recount.page import CELL, Block
 
 _Numbers = tuple[str | None, ...] | None
 _WORST = ("refuted", "not shown", *reversed(HOLDS))
-HAZARD = 45
+HAZARD = 120
 """Characters of a hazard's text on the first screen."""
 _SORTS = {
     "the world": "the world",
@@ -157,7 +157,7 @@ def _dangers(facts: Facts, match: re.Match[str], _block: Block) -> _Numbers:
         texts = [h["text"] if len(h["text"]) <= HAZARD else h["text"][: HAZARD - 1].rstrip() + "…" for h in own]
         names = [f"{h['id']} {text} ({h['severity']})" for h, text in zip(own[:3], texts, strict=False)]
         more = f" and {len(own) - 3} more" if own[3:] else ""
-        told += [" ".join(f"{level} {', '.join(names)}{more}".split())] if own else []
+        told += [" ".join(f"mitigation {level} {', '.join(names)}{more}".split())] if own else []
     true = f"{'; '.join(told)}." if told else "none is declared."
     left = re.findall(r"\d+", match[1].removeprefix(true))
     return match.groups() if match[1].startswith(true) and left in ([], [str(len(facts.requirements) - 3)]) else (true,)

@@ -25,8 +25,10 @@ from avow.report.goals import doubts
 from avow.report.modules import NodeModule, RequirementModule, conditions, node_modules, requirement_modules
 from avow.report.page import fill, known_pages, svg_image
 
-KINDS = 8
+KINDS = 7
 """Kinds of deficit in words on the first screen, the weightiest first: a link counts and explains all."""
+DOUBTS = 1
+"""Doubts about evidence in words on the first screen: those that are open for the most evidence."""
 _ORDER = (Tone.RED, Tone.AMBER, Tone.GREEN, Tone.GREY)
 WORDS = (
     *((level.value, meaning) for level, meaning in MEANINGS.items()),
@@ -55,6 +57,7 @@ def render_answers(case: Case, json_digest: str = "") -> str:
         bowtie=lambda view: svg_image(bowtie(view)),
         brief=wording.gate_line,
         dangers=wording.dangers(case),
+        doubts=[text for text, _, left, _ in sorted(doubts(case), key=lambda doubt: -doubt[2])[:DOUBTS] if left],
         no_hazard=wording.NO_HAZARD,
         weakest=wording.weakest,
         by_level=by_level,

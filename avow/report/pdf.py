@@ -158,7 +158,7 @@ def _first(case: Case) -> dict[str, Any]:
         "tone": a.tone.value,
         "counts": a.beside,
         "fails": f"Fails: {'; '.join(f.title for f in a.failures)}." if a.failures else "",
-        "hazards": "; ".join(f"{tone.mark} {level}: {names}" for tone, level, names in dangers(case)),
+        "hazards": "; ".join(f"{tone.mark} mitigation {level}: {names}" for tone, level, names in dangers(case)),
         "by_level": [
             [f"{number} {level}", ", ".join(r.id for r in case.requirements if r.level is level)]
             for level, number in a.by_level

@@ -93,11 +93,11 @@ def test_each_gate_that_fails_is_in_the_banner_and_each_hazard_on_the_first_scre
     told = " ".join(re.sub(r"<[^>]*>", " ", page).split())
     assert "“Gate 0” fails." in told
     assert "Also fail: Gate 1; Gate 2; Gate 3 ." in told
-    assert "✘ not shown H1 It burns (critical), H2 It burns (critical), H3" in told
-    assert "H3 It burns (critical) and 5 more ; ◐ argued H0 It burns (critical) ." in told
+    assert "✘ mitigation not shown H1 It burns (critical), H2 It burns (critical), H3" in told
+    assert "H3 It burns (critical) and 5 more ; ◐ mitigation argued H0 It burns (critical) ." in told
     assert f"{found.gates[0].title}: {found.gates[0].state}." in page, "the gates by name, under the pointer"
     assert "◐ argued argued: a person&#39;s word" in told
-    assert pdf_data(found)["first"]["hazards"].startswith("✘ not shown: H1 It burns (critical)")
+    assert pdf_data(found)["first"]["hazards"].startswith("✘ mitigation not shown: H1 It burns (critical)")
     assert "| H8 | It burns | critical | ✘ no mitigation |" in render_markdown(found)
     bare = make_case(system({"n": ["g"]}, requirements=[asked]), [target], [evidence(target)])
     assert "none is declared" in render_answers(bare)
@@ -244,7 +244,7 @@ def test_assumptions_stand_in_words_on_paper_or_with_the_page_that_has_them() ->
     full = replace(found, assumptions=many, answers=replace(found.answers, supposed=(line,)))
     assert not worded(full)
     assert words(full) == []
-    assert "also A2 to A39, under" in both(full)
+    assert "also A2 to A39 (in the argument)" in both(full)
     assert pdf_data(full)["first"]["supposed"][0][2] == "also A2 to A39"
 
 

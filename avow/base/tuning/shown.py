@@ -7,8 +7,8 @@ TOOL_WORDS = 160
 TREND_RUNS = 24
 """Runs shown, the newest: so many columns fit beside each other."""
 
-HAZARD_CHARACTERS = 45
-"""Characters of a hazard's text on the first screen, where three hazards of a level have a line or two."""
+HAZARD_CHARACTERS = 120
+"""Characters of a hazard's text on the first screen: about a line, so that a qualification at its end is not lost."""
 
 SOURCE_COLUMNS = 100
 """Columns of a source line that are shown around a fault: a terminal's width, less its margin."""
