@@ -9,6 +9,7 @@ from collections.abc import Iterator, Sequence
 
 from avow.assurance.answers import ABOUT
 from avow.assurance.model import Case, RequirementView
+from avow.base.plain import listed
 from avow.report.wording import clean, weakest
 
 LINES, WIDTH, WORDS = 24, 80, 150
@@ -58,6 +59,7 @@ def comment(case: Case) -> str:
         escaped(a.changed_against) or "No report has been signed yet.",
         "\n".join(f"- {mark} {escaped(_few(words))}" for mark, words in a.changed if mark),
         f"Weakest evidence: {escaped(_few(_weakest_words(case)))}",
+        "Hazards: " + (listed([f"{escaped(h.hazard.id)} mitigation {h.level}" for h in case.hazards], 6) or "none"),
         "<details><summary>Requirements and assumptions</summary>",
         "\n".join(
             f"- {r.tone.mark} **{escaped(r.id)}** {r.stands}: {escaped(_one(r))}" for r in case.requirements[:40]

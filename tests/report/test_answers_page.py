@@ -20,7 +20,7 @@ from avow.evidence.obligation import Kind
 from avow.report.answers_page import render_answers, render_argument, worded
 from avow.report.markdown import render_markdown
 from avow.report.pdf import _data as pdf_data
-from avow.report.short import markdown_head, terminal_lines
+from avow.report.short import comment, markdown_head, terminal_lines
 from avow.report.wording import NO_HAZARD
 from avow.system.plan import Hazard, Requirement, Statement
 from report.chromium import measure
@@ -98,6 +98,7 @@ def test_each_gate_that_fails_is_in_the_banner_and_each_hazard_on_the_first_scre
     assert f"{found.gates[0].title}: {found.gates[0].state}." in page, "the gates by name, under the pointer"
     assert "◐ argued argued: a person&#39;s word" in told
     assert pdf_data(found)["first"]["hazards"].startswith("✘ mitigation not shown: H1 It burns (critical)")
+    assert "Hazards: H0 mitigation argued, H1 mitigation not shown, " in comment(found)
     assert "| H8 | It burns | critical | ✘ no mitigation |" in render_markdown(found)
     bare = make_case(system({"n": ["g"]}, requirements=[asked]), [target], [evidence(target)])
     assert "none is declared" in render_answers(bare)
