@@ -171,9 +171,8 @@ def upper_bound(record: Evidence) -> float | None:
 
 
 def judgements(record: Evidence) -> int:
-    """The number of trials that it rests on; 0 if it names none. A run is one trial, whatever the number of its
-    messages: they depend on each other."""
-    for key in ("triggered", "runs", "judged", "cases"):
+    """The number of cases, runs or judgements that it rests on; 0 if it names none."""
+    for key in ("triggered", "judged", "runs", "cases"):
         value = record.bound.get(key)
         if isinstance(value, int) and not isinstance(value, bool):
             return value

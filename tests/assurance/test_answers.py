@@ -44,7 +44,7 @@ from avow.assurance.deficits import _WORDS
 from avow.assurance.deficits import words_of as deficit_words
 from avow.assurance.first_screen import WARNED, _lines, _owners
 from avow.assurance.model import Case
-from avow.assurance.relied import judgements, relied_of, weakness
+from avow.assurance.relied import relied_of, weakness
 from avow.base.plain import identifiers, words_of
 from avow.base.verdict import Hypothesis, HypothesisKind, Link, Object, Verdict, bound
 from avow.evidence.obligation import SYSTEM_LEVEL, Kind, Obligation
@@ -261,7 +261,6 @@ def test_the_weakest_sample_has_the_highest_bound_whatever_its_kind() -> None:
     ]
     order = sorted(tests, key=lambda r: weakness(relied_of(r, Status(r.verdict.value))))
     assert [r.bound for r in order] == [known[2], known[1], known[0]]
-    assert judgements(evidence(GUARANTEES[0], Verdict.TESTED, "hypothesis", bound={"judged": 60, "runs": 3})) == 3
 
 
 def test_of_the_wiring_alone_nothing_is_shown_of_the_running_program() -> None:
