@@ -5,12 +5,12 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from avow.base.diagnostics import Rejected
-from avow.base.suggestions import suggest
+from avow.base.suggestions import nearest, suggest
 from avow.formulas.values import FunctionValue, Value
 from avow.language import sorts as s
 from avow.language.contract import Node, Port
@@ -333,6 +333,27 @@ def path(text: str) -> FieldPath:
         found += [name] if name or not indices else []
         found += map(int, indices)
     return tuple(found)
+
+
+def without_field(
+    rules: Iterable[Fields | Choice], known: Definitions, text: str, options: Located | None
+) -> NoField | None:
+    """Why no message of the rules has a field at a path, as far as their types are known. A line of JSON may have more
+    fields than its type, but hardly one whose name is nearly that of another."""
+    names, way, missing = recordings(options), path(text), None
+    bags = bool(names) and not any(name.endswith(".jsonl") for name in names)
+    for message in (known.get(rule.kind) for rule in rules):
+        if not way or message is None or known.missing(message):
+            return None
+        try:
+            known.at(message, way)
+            return None
+        except NoField as error:
+            fields = [each.name for each in message.fields]
+            if not (bags or way[0] in fields or nearest(str(way[0]), fields)):
+                return None
+            missing = missing or error
+    return missing
 
 
 def literal(raw: Any, sort: s.Sort, key: str) -> Value:

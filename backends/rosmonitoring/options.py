@@ -237,6 +237,10 @@ class _Work:
             if known and name.startswith(f"{Role.INPUT}.") and (name in parts or "others" not in entry):
                 text = f"by {by} it has no effect: an answer is judged with the message that it answered"
                 self.fault(text, name, "initial", hint=f"leave it out, {_PAIR}")
+        for end, role in (("input", Role.INPUT), ("output", Role.OUTPUT)) if by not in ("call", "order") else ():
+            of = [r for r in self.rules.values() if isinstance(r, Fields | Choice) and r.variable.role is role]
+            if end in entry and (lacks := observing.without_field(of, self.known, str(entry[end]), self.options)):
+                self.wrong(f"answers.{end}: {lacks}", "answers", end, hint=lacks.hint)
         ends = ((p, observing.sources(self.system, self.node, p.name)) for p in self.node.inputs)
         looped = (
             p for p, found in ends if any(self.node.name in dataflow(self.system).upstream(s.node) for s in found)

@@ -258,6 +258,19 @@ PAIRINGS: list[dict[str, Any]] = [
 ]
 
 
+@pytest.mark.parametrize(("way", "said"), [("header.stmp", True), ("headr.stamp", True), ("id", False)])
+def test_a_field_of_no_message_pairs_no_answers(make_system: Make, way: str, said: bool) -> None:
+    """A line of JSON may have a field that its type lacks."""
+    rcl, message = ONE.replace("std_msgs/Float64", "a/N"), {"a/N": "std_msgs/Header header\nfloat64 data"}
+    more: dict[str, Any] = {"messages": message, "plan": {"ros": {"distro": "humble"}}, "traces": ["t.jsonl"]}
+    answers = {"by": "key", "input": way, "output": "header.stamp"}
+    system = make_system(rcl, {"in.r": "data", "out.v": "data"}, answers=answers, **more)
+    _, faults = options.setup(system, system.contract.node("n"), system.plan.node("n").methods[0].options)
+    assert [(f.code, "answers.input" in f.message, f.hint) for f in faults] == [
+        ("MON101", True, f"did you mean `{'stamp' if 'stmp' in way else 'header'}`?")
+    ] * said
+
+
 @pytest.mark.parametrize("hold", [False, True])
 @pytest.mark.parametrize("answers", PAIRINGS)
 def test_an_initial_value_has_an_effect_or_is_refused(make_system: Make, answers: dict[str, Any], hold: bool) -> None:
