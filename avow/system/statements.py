@@ -29,9 +29,11 @@ _ARGUMENTS = {"persistence": "persistence", "one_output": "one-output", "entered
 
 
 def read_statements(root: Piece) -> tuple[tuple[Statement, ...], list[Diagnostic]]:
-    """Every statement of a well-shaped plan, and the faults in their words and dates."""
+    """Every statement of a well-shaped plan, and the faults in their words and dates. An entry that assumes nothing is
+    one, of no place, if it has a last day: then its reason has to be read again."""
     faults: list[Diagnostic] = []
-    return tuple(_statement(*each, faults) for each in _places(root)), faults
+    found = [_statement(*each, faults) for each in _places(root)]
+    return tuple(each for each in found if each.place or each.until), faults
 
 
 def without_words(system: System) -> Iterator[Diagnostic]:
@@ -117,8 +119,8 @@ def wrong_words(place: str, piece: Piece) -> Iterator[Diagnostic]:
 
 
 def _has_fixed_words(place: str) -> bool:
-    """Whether the statement at a place has the same words in every plan."""
-    return place.startswith("requirements.") or place in GENERAL
+    """Whether the statement at a place has the same words in every plan, or needs none."""
+    return not place or place.startswith("requirements.") or place in GENERAL
 
 
 def _own(statement: Statement, plan: Plan) -> bool:
@@ -130,11 +132,10 @@ def _places(root: Piece) -> Iterator[tuple[str, str, Piece]]:
     for port, _, piece in root.keyed("environment"):
         constant = piece.at("constant")
         holds = constant is not None and constant.value is not False
-        if piece.at("assume") is not None or holds:
-            yield f"environment.{port}", f"environment.{port}", piece
+        name = f"environment.{port}"
+        yield name if piece.at("assume") is not None or holds else "", name, piece
         if piece.at("assume") is not None and constant is not None and holds:
-            name = f"environment.{port}.constant"
-            yield name, name, constant  # constancy is a separate statement
+            yield f"{name}.constant", f"{name}.constant", constant  # constancy is a separate statement
     for section in ("compose", "subsystems"):
         for goal, _, piece in root.keyed(section):
             for key, name in _ARGUMENTS.items():

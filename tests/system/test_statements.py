@@ -84,3 +84,13 @@ def test_that_an_input_does_not_change_has_words_of_its_own(tmp_path: Path) -> N
     assert found.message.startswith("compose.whole.one_output has expired")
     assert [d.code for d in faults(tmp_path / "x", A, entry.format(f"constant: {own}"))] == ["PLAN110"]
     assert [d.code for d in faults(tmp_path / "y", A, entry.format("constant: {says: It stays}"))] == ["PLAN104"]
+
+
+def test_an_entry_that_assumes_nothing_has_words_and_days_that_are_read(tmp_path: Path) -> None:
+    entry = "environment: {{a.r: {{because: b, {}}}}}"
+    for at, wrong in enumerate(("date: 2026-13-01", "date: 2999-01-01", f"says: {'word ' * 20}", "who: '?'")):
+        found = faults(tmp_path / str(at), A, entry.format(wrong))
+        assert [d.code for d in found] == ["PLAN115" if "says" in wrong else "PLAN105"], wrong
+    gone = make(tmp_path / "gone", A, entry.format("until: 2020-02-02"))
+    assert [d.message for d in expired(gone)] == ["environment.a.r has expired: its last day was 2020-02-02"]
+    assert not list(without_words(gone))
