@@ -32,7 +32,7 @@ def check_names(plan: Plan, root: Piece, contract: Contract) -> tuple[Diagnostic
         *_nodes(plan, root, nodes),
         *_running(root, nodes),
         *_scenario(plan, root, contract, nodes),
-        *_findings(root, nodes),
+        *_findings(plan, root, nodes),
         *_assumptions(plan, root),
         *check_mitigations(plan, nodes),
         *check_memory(plan, nodes),
@@ -191,15 +191,23 @@ def _scenario(plan: Plan, root: Piece, contract: Contract, nodes: dict[str, Node
             yield from _unusable(f"scenario.domains.{name}", texts, sorts[0], contract, place, used)
 
 
-def _findings(root: Piece, nodes: dict[str, Node]) -> Iterator[Diagnostic]:
+def _findings(plan: Plan, root: Piece, nodes: dict[str, Node]) -> Iterator[Diagnostic]:
+    """Checks the nodes, the sorts of claims, and the names that do not follow from a derivation or an analysis."""
+    known = [f"{name}/guarantee/{clause.name}" for name, node in nodes.items() for clause in node.guarantees]
+    known += [f"system/requirement/{requirement.id}" for requirement in plan.requirements]
     for key in ("expected", "accepted"):
         for item in root.each(key):
             obligation = item.at("obligation")
             if obligation is None:
                 continue
-            owner = obligation.text.split("/")[0]
+            owner, _, rest = obligation.text.partition("/")
             if owner not in nodes and owner != "system" and not set(owner) & set("*?["):
                 yield _unknown(f"{key}: node", owner, [*nodes, "system"], obligation.span)
+            elif not (set(obligation.text) & set("*?[") or rest.startswith(_DERIVED) or obligation.text in known):
+                yield _unknown(f"{key}: obligation", obligation.text, known, obligation.span)
+
+
+_DERIVED = ("well-formed/", "sanity/", "composition/", "program/")
 
 
 # -- are a scenario's values values? What a domain or a table gives must be of the type that it is given for -----------

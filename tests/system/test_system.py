@@ -105,6 +105,9 @@ def test_faults_of_plan_and_contract_come_together(tmp_path: Path) -> None:
         ("scenario: {domains: {in.r: 0..100000000000}}", "PLAN109", 1, "more than 100000 values", ""),
         ("scenario: {domains: {REALS: 1}}", "PLAN106", 1, "REALS", "`REAL`"),
         ("expected: [{obligation: c/sanity/x, verdict: refuted}]", "PLAN106", 1, "'c'", "a, b, system"),
+        ("expected: [{obligation: a/guarantee/g11, verdict: refuted}]", "PLAN106", 1, "g11", "a/guarantee/g1"),
+        ("expected: [{obligation: a/guarante/g1, verdict: refuted}]", "PLAN106", 1, "guarante/", "a/guarantee/g1"),
+        ("expected: [{obligation: system/requirement/R, verdict: refuted}]", "PLAN106", 1, "requirement/R", ""),
         ("connections: [{from: a.x, to: b.x, delayed: true, initial: blue}]", "PLAN112", 1, "blue", ""),
         ("connections: [{from: a.x, to: b.x, delayed: true, initial: out.x > in.q}]", "PLAN112", 1, "is no value", ""),
         ("connections: [{from: a.x, to: b.x, delayed: true, initial: out.x > in.r}]", "PLAN112", 1, "of in.r", ""),
@@ -457,5 +460,5 @@ def test_a_sentence_that_was_changed_is_a_warning_with_what_to_write(tmp_path: P
     assert [d.code for d in wrong] == ["PLAN105"]
     (to_come,) = faults(tmp_path / "f", A, plan.format("It does", *read).replace("2026-01-01", "2999-01-01"))
     assert "in the future" in to_come.message
-    listed = "expected: [{obligation: a/guarantee/g, verdict: refuted, matched: [a/guarantee/g]}]"
+    listed = "expected: [{obligation: a/guarantee/g1, verdict: refuted, matched: [a/guarantee/g1]}]"
     assert [d.code for d in faults(tmp_path / "e", A, listed)] == ["PLAN110"]
