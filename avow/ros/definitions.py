@@ -228,14 +228,37 @@ def parse_message(text: str, name: str, source: str = "") -> Message:
                 raise WrongDefinition(f"the constant {found['name']} has no built-in type", number)
             # a string's value is the rest of the line, including what looks like a comment (ROS 1)
             value = raw.split("=", 1)[1].strip() if scalar.name == "string" else rest[1:].strip()
+            if not _is_value(value, found["type"]):
+                raise WrongDefinition(f"{value[:60]!r} is no value of {found['type']}", number)
             constants.append((found["name"], scalar.name, value.strip("\"'") if scalar.name == "string" else value))
             continue
+        if rest and (rest[0] == ";" or not line[found.end("name")].isspace()):
+            text = f"{rest[:60]!r} stands after the name of the field {found['name']}"
+            raise WrongDefinition(text, number, "a line ends with the name, or with a default value set apart from it")
         if found["name"] in fields:
             raise WrongDefinition(f"the field {found['name']} is listed twice", number)
         size = found["size"] or ""
         wire = Array(scalar, int(size) if size.isdigit() else None) if found["array"] else scalar
         fields[found["name"]] = Field(found["name"], wire, number)
     return Message(name, tuple(fields.values()), tuple(constants), source)
+
+
+def _is_value(text: str, kind: str) -> bool:
+    """Whether a built-in type has a constant's value. A byte and a char have a sign or none, by distribution."""
+    try:
+        match OTHER_NAMES.get(kind, kind):
+            case "bool":
+                return text.lower() in ("true", "false", "0", "1")
+            case "float32" | "float64":
+                float(text)
+            case name if name in INTEGERS:
+                least, greatest = INTEGERS[name] if kind == name else (-128, 255)
+                return least <= int(text, 0 if re.match("[+-]?0[xob]", text.lower()) else 10) <= greatest
+            case _:  # any text is a string
+                pass
+        return True
+    except ValueError:
+        return False
 
 
 def _scalar(name: str, package: str) -> Scalar | Nested:

@@ -59,7 +59,19 @@ def test_the_forms_of_a_message() -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "line"), [("int32", 1), ("int32 x\nfloat64 x", 2), ("p/T X=3", 1), ("int32 x y\n\n?? z", 3)]
+    ("text", "line"),
+    [
+        ("float64 kg;", 1),
+        ("float64 kg ;", 1),
+        ("uint8 OPEN=300", 1),
+        ("int8 UP=\nint8 x", 1),
+        ("bool B=maybe", 1),
+        ("float32 F=1,5", 1),
+        ("int32", 1),
+        ("int32 x\nfloat64 x", 2),
+        ("p/T X=3", 1),
+        ("int32 x y\n\n?? z", 3),
+    ],
 )
 def test_what_is_no_definition_is_located(text: str, line: int) -> None:
     with pytest.raises(WrongDefinition) as caught:
