@@ -76,7 +76,10 @@ class RosMonitoringBackend(Backend):
         for at, (name, digest) in enumerate(_traces(job).items()):
             path, span = inside(job.root, name), job.method.options.at("traces", at)
             hint = nearby(job.root / name, name)
-            if path is None or (not path.exists() and (hint or not digest)):  # of a bag with a digest, git has no copy
+            if path is None:
+                message = f"traces: the path {name!r} leads out of the system's folder"
+                problems.append(Diagnostic("MON102", message, span, hint="put the recording into the folder"))
+            elif not path.exists() and (hint or not digest):  # of a bag with a digest, git has no copy
                 message = f"traces: there is no file {name!r} in the system's folder"
                 severity = Severity.WARNING if digest else Severity.ERROR
                 problems.append(Diagnostic("MON102", message, span, severity, hint))
