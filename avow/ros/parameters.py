@@ -11,6 +11,8 @@ import re
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+OF_EVERY_NODE = ("use_sim_time", "qos_overrides", "start_type_description_service")
+"""First parts of the names of parameters that every node of ROS 2 has."""
 SECTION = "ros__parameters"
 SLIP = SECTION.replace("__", "_")
 

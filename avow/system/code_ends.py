@@ -21,7 +21,7 @@ from avow.ros.code import Code, Created, read_code
 from avow.ros.definitions import canonical
 from avow.ros.drafting import is_plumbing
 from avow.ros.names import Placed
-from avow.ros.parameters import flat
+from avow.ros.parameters import OF_EVERY_NODE, flat
 from avow.ros.quality import Quality, Recorded, recorded, unmet
 from avow.system.launched import where
 from avow.system.node_plan import parameters
@@ -32,7 +32,6 @@ _SIDES = {Role.OUTPUT: "publishes", Role.INPUT: "subscribes"}
 _TOPICS = tuple(_SIDES.values())
 _DOES = {"publishes": "publishes", "subscribes": "subscribes to", "serves": "serves", "calls": "calls"}
 _DOES |= {"does": "serves the action", "orders": "calls the action"}
-_OWN_PARAMETERS = ("use_sim_time", "qos_overrides", "start_type_description_service")
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,7 +133,7 @@ def _never_declared(plan: Plan, source: Source, placed: Placed, code: Code) -> I
     declared = [end.name for end in code.created if end.side == "declares"]
     values, wrong = parameters(plan.root, source, placed.name)
     for name, _ in () if wrong else flat(values):
-        if name not in declared and name.partition(".")[0] not in _OWN_PARAMETERS:
+        if name not in declared and name.partition(".")[0] not in OF_EVERY_NODE:
             text = f"`{source.parameters}` sets {name}, which {source.class_name} never declares"
             hint = suggest(name, declared) or "correct its name, or remove it"
             span = source.place.at("source", "parameters")

@@ -22,7 +22,7 @@ from avow.base.workspace import find_workspace
 from avow.language.contract import Contract, Node
 from avow.ros.launch import Launched, Setting, Started, read_launch
 from avow.ros.names import Placed, Resolver
-from avow.ros.parameters import WrongParameters, flat, is_sectioned, of_node
+from avow.ros.parameters import OF_EVERY_NODE, WrongParameters, flat, is_sectioned, of_node
 from avow.ros.quality import BAG_FILE
 from avow.system.node_plan import parameter_place, parameters
 from avow.system.plan import Plan, System
@@ -103,6 +103,9 @@ def _parameters(plan: Plan, node: Node, launched: Started) -> Iterator[Diagnosti
 
     of_contract = {port.name for port in node.parameters}  # the class is run with the launch file's value
     there = {name: it for name, it in there.items() if name in here or name.replace(".", "_") not in of_contract}
+    text = read_regular(path) if (path := plan.root / source.python).is_file() else b""
+    ignored = {s.name for s in launched.parameters if s.shared and s.name.encode() not in text} | {*OF_EVERY_NODE}
+    there = {name: it for name, it in there.items() if name in here or not {name, name.partition(".")[0]} & ignored}
     alone = sorted(here.keys() - there.keys()) if there and not unread else []
     for name, (value, span) in there.items():
         if here.get(name) != value or isinstance(here[name], bool) is not isinstance(value, bool):

@@ -382,3 +382,16 @@ def test_arguments_that_remap_otherwise_are_a_doubt(name: str, tmp_path: Path) -
     text = f'<launch><remap from="scan" to="x"/><node pkg="p" {word}="e" name="n" args="scan:=y"/></launch>'
     (node,) = read(tmp_path, text, name).nodes
     assert "its arguments remap scan too" in node.unread
+
+
+def test_parameters_outside_of_a_node_reach_it_and_the_last_one_holds(tmp_path: Path) -> None:
+    text = """<launch>
+      <param name="/left/b/limit" value="1.0"/>
+      <group ns="left">
+        <node name="b" pkg="p" type="b"><param name="limit" value="2.0"/></node>
+        <param name="b/limit" value="3.0"/><param name="bb/limit" value="4.0"/>
+      </group>
+    </launch>"""
+    (tmp_path / "r.launch").write_text(text, encoding="utf-8")
+    (node,) = read_launch([(tmp_path / "r.launch", {})], tmp_path).nodes
+    assert [(s.name, s.value) for s in node.parameters] == [("limit", "1.0"), ("limit", "2.0"), ("limit", "3.0")]

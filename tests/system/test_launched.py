@@ -239,6 +239,16 @@ NODE = "<node name='b' pkg='p' exec='b'>{}</node>"
         ("limit: 3.0", "Node(name='b', ros_arguments=['-p', 'limit:=4.0'], parameters=[HERE])", ""),
         ("limit: 2.0", "Node(name='b', ros_arguments=['-p', 'b:limit:=3.0'])", "not read"),
         ("limit: 2.0", NODE.format("<param name='limit' value='3.0' if='false'/>"), ""),
+        ("limit: 2.0", "SetParameter('limit', 3.0), Node(name='b')", "limit = 3.0"),
+        ("limit: 2.0", "SetParameter('limit', 3.0), Node(name='b', parameters=[{'limit': 2.0}])", ""),
+        ("limit: 2.0", "GroupAction([SetParameter('limit', 3.0)]), Node(name='b')", ""),
+        (
+            "limit: 2.0",
+            "SetParameter('other', 1), Node(name='b', parameters=[{'limit': 2.0, 'use_sim_time': True}])",
+            "",
+        ),
+        ("limit: 2.0", "Node(name='b'), SetParameter('limit', 3.0)", ""),
+        ("limit: 2.0", "SetParametersFromFile(HERE), Node(name='b')", "limit = 3.0"),
         ("limit: 2.0", NODE.format("<rosparam file='$(dirname)/plain.yaml'/>"), "limit = 5.0"),
         ("limit: 2.0", NODE.format("<rosparam file='$(dirname)/plain.yaml' ns='x'/>"), "not read"),
         ("limit: 2.0", "Node(name='b', package='p', executable='b', parameters=[HERE, unknown()])", "not read"),
@@ -254,7 +264,7 @@ NODE = "<node name='b' pkg='p' exec='b'>{}</node>"
 def test_parameters_of_a_launch_file_are_compared(tmp_path: Path, own: str, launched: str, said: str) -> None:
     """A class is examined with the parameters that the robot starts it with, or the difference is named."""
     plan = "nodes: {b: {source: {python: b.py, class: B, kind: rclpy, parameters: p.yaml}, methods: []}}\n"
-    if launched.startswith("Node"):
+    if not launched.startswith("<"):
         here = "PathJoinSubstitution([ThisLaunchFileDir(), 'p.yaml'])"
         text = "from launch import *\n\n\ndef generate_launch_description():\n"
         text += f"    return LaunchDescription([{launched.replace('HERE', here)}])\n"

@@ -38,8 +38,6 @@ _RENAMED = {
 _SILENT = frozenset(
     [
         "LogInfo",
-        "SetParameter",
-        "SetParametersFromFile",
         "SetUseSimTime",
         "SetEnvironmentVariable",
         "UnsetEnvironmentVariable",
@@ -61,6 +59,8 @@ _MADE: Mapping[str, tuple[str, Mapping[str, str]]] = {
     "PushRosNamespace": ("push_ros_namespace", {"namespace": "namespace"}),
     "PushROSNamespace": ("push_ros_namespace", {"namespace": "namespace"}),
     "SetRemap": ("set_remap", {"src": "from", "dst": "to"}),
+    "SetParameter": ("set_parameter", {"name": "name", "value": "value"}),
+    "SetParametersFromFile": ("set_parameter", {"filename": "from"}),
     "DeclareLaunchArgument": ("arg", {"name": "name", "default_value": "default"}),
     "SetLaunchConfiguration": ("let", {"name": "name", "value": "value"}),
 }

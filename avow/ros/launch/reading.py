@@ -31,7 +31,8 @@ def read_launch(files: Iterable[tuple[Path, Mapping[str, str]]], root: Path) -> 
     work = _Reading(root.resolve())
     for path, given in files:
         work.file(path.resolve(), dict(given), None)
-    return Launched(tuple(work.nodes), tuple(dict.fromkeys(work.unread)), tuple(work.files))
+    nodes = tuple(work.with_server(k, node) for k, node in enumerate(work.nodes))
+    return Launched(nodes, tuple(dict.fromkeys(work.unread)), tuple(work.files))
 
 
 class _Unknown(Exception):  # noqa: N818 - it says what was found
@@ -52,6 +53,8 @@ class _Scope:
     """Why nodes here may not be started, or may have other names."""
     lost: bool = False
     """Whether its namespace is unknown."""
+    settings: tuple[Setting, ...] = ()
+    """ROS 2: the parameters of all nodes here."""
 
     def inner(self) -> _Scope:
         return replace(self, args=dict(self.args), remaps=list(self.remaps))
@@ -65,6 +68,8 @@ class _Scope:
         if sure or inner.doubt != doubt or inner.remaps != self.remaps:
             self.doubt = inner.doubt
         self.lost = inner.lost or (not sure and inner.namespace != self.namespace)
+        more = inner.settings[len(self.settings) :]
+        self.settings += more if sure else tuple(replace(setting, value="") for setting in more)
         self.namespace, self.remaps = inner.namespace, inner.remaps
 
 
@@ -75,7 +80,6 @@ _SILENT = frozenset(
         "env",
         "set_env",
         "unset_env",
-        "set_parameter",
         "set_use_sim_time",
         "machine",
         "test",
@@ -96,6 +100,8 @@ class _Reading:
     nodes: list[Started] = field(default_factory=list)
     unread: list[Diagnostic] = field(default_factory=list)
     files: dict[Path, None] = field(default_factory=dict)
+    server: list[tuple[int, Setting]] = field(default_factory=list)
+    """ROS 1: parameters outside of nodes, by their whole names, and how many nodes come before each."""
     count: int = 0
     packages: dict[str, Path] | None = None
 
@@ -120,7 +126,7 @@ class _Reading:
         self.each(parsed.elements, scope)
         if outer is not None and not ros1:
             outer.namespace, outer.lost, outer.remaps = scope.namespace, scope.lost, scope.remaps
-            outer.doubt = scope.doubt
+            outer.doubt, outer.settings = scope.doubt, scope.settings
         return not ros1
 
     def each(self, elements: Iterable[Element], scope: _Scope) -> None:
@@ -160,6 +166,11 @@ class _Reading:
                 self.include(element, scope, doubt)
             case "arg" | "let":
                 self.arg(element, scope, started)
+            case "set_parameter":
+                scope.settings += (replace(self.setting(element, scope, started), shared=True),)
+            case "param" if scope.ros1 and not scope.lost:
+                set_ = self.setting(element, scope, started)
+                self.server.append((len(self.nodes), replace(set_, name=_within(scope.namespace, set_.name))))
             case tag if tag in _SILENT:
                 pass
             case tag:
@@ -290,7 +301,7 @@ class _Reading:
                 self.tell(element, f"the node's name is not known: {why}")
         parts = [self.shown(element.get(key), scope) for key in ("pkg", "exec", "type", "plugin")]
         kind = "/".join(part for part in parts if part)
-        settings = (*(Setting(*one, element.span) for one in given), *self.settings(element, scope))
+        settings = (*(Setting(*one, element.span) for one in given), *scope.settings, *self.settings(element, scope))
         self.nodes.append(Started(whole, kind, tuple(remaps), tuple(dict.fromkeys(doubt)), element.span, settings))
         if element.tag.endswith("container"):
             self.each((e for e in element.children if e.tag == "composable_node"), outer)
@@ -299,10 +310,20 @@ class _Reading:
         """The parameters that a node is started with, as far as they are known."""
         for child in element.children:
             if child.tag in ("param", "rosparam") and (holds := self.condition(child, scope)) is not False:
-                name = self.shown(child.get("name"), scope)
-                value = self.shown(child.get("from", "file", "value"), scope)
-                file = "from" in child.attributes or child.attributes.keys() == {"file"}
-                yield Setting(name, value if holds is True and (name or file) else "", child.span)
+                yield self.setting(child, scope, holds)
+
+    def setting(self, element: Element, scope: _Scope, holds: bool | str) -> Setting:
+        name = self.shown(element.get("name"), scope)
+        value = self.shown(element.get("from", "file", "value"), scope)
+        file = "from" in element.attributes or element.attributes.keys() == {"file"}
+        return Setting(name, value if holds is True and (name or file) else "", element.span)
+
+    def with_server(self, place: int, node: Started) -> Started:
+        """ROS 1: with the parameters that elements outside of the node set for it. The last one of a name holds."""
+        prefix = f"{node.name}/"
+        own = [(k, replace(s, name=s.name[len(prefix) :])) for k, s in self.server if s.name.startswith(prefix)]
+        before, after = ([s for k, s in own if (k > place) is late] for late in (False, True))
+        return replace(node, parameters=(*before, *node.parameters, *after)) if node.name and own else node
 
     def command_line(
         self, element: Element, scope: _Scope, doubt: list[str], given: list[tuple[str, str]]

@@ -32,6 +32,8 @@ class Setting:
     name: str
     value: str
     span: Span = field(compare=False, repr=False)
+    shared: bool = False
+    """Whether it is set for all nodes of a scope, which need not have such a parameter."""
 
 
 @dataclass(frozen=True, slots=True)
