@@ -1,4 +1,5 @@
-"""A node's own class, as far as its text shows, without running it, that it fails: callbacks, undefined names."""
+"""A node's own class, as far as its text shows, without running it, that it fails: callbacks, imports of messages,
+undefined names."""
 
 from __future__ import annotations
 
@@ -10,6 +11,8 @@ from avow.base.diagnostics import Diagnostic, Severity, Span
 from avow.base.files import inside, read_regular
 from avow.base.plain import count
 from avow.base.python_names import unbound
+from avow.base.suggestions import suggest
+from avow.ros.sources import definitions
 from avow.system.plan import Plan
 
 _GIVES: Mapping[str, tuple[int, str, tuple[str, ...], int]] = {
@@ -35,9 +38,24 @@ def misused(plan: Plan) -> Iterator[Diagnostic]:
         with contextlib.suppress(OSError, SyntaxError, ValueError, RecursionError):
             tree = ast.parse(read_regular(path))
             yield from _callbacks(tree, str(path))
+            yield from _imports(tree, str(path), plan)
             for name, hint in unbound(tree):
                 message = f"`{name.id}` is not defined: the file neither imports nor assigns it"
                 yield Diagnostic("DRIVE106", message, _span(name, str(path)), Severity.WARNING, hint)
+
+
+def _imports(tree: ast.Module, file: str, plan: Plan) -> Iterator[Diagnostic]:
+    """A warning for each message that is imported from a known package without it."""
+    wanted = [(node, part) for node in ast.walk(tree) if isinstance(node, ast.ImportFrom) for part in node.names]
+    wanted = [(node, part) for node, part in wanted if (node.module or "").endswith(".msg") and not node.level]
+    known = definitions(plan.messages, plan.ros.distro)[0].messages if wanted else {}
+    for node, part in wanted:
+        package = (node.module or "").removesuffix(".msg")
+        own = [name.removeprefix(f"{package}/") for name in known if name.startswith(f"{package}/")]
+        if own and part.name not in (*own, "*"):
+            at = Span(file, part.lineno, part.col_offset + 1, part.lineno, part.col_offset + 1 + len(part.name))
+            message = f"{package} has no message {part.name!r}"
+            yield Diagnostic("DRIVE107", message, at, Severity.WARNING, suggest(part.name, own))
 
 
 def _callbacks(tree: ast.Module, file: str) -> Iterator[Diagnostic]:

@@ -91,3 +91,25 @@ def test_a_name_that_nothing_defines(tmp_path: Path) -> None:
         ("DRIVE106", "import it, or define it in this file"),
     ]
     assert told(tmp_path, "from os import *; print(sep)", "pass") == []
+
+
+@pytest.mark.parametrize(
+    ("imported", "said"),
+    [
+        ("from own.msg import Laod", [("DRIVE107", "did you mean `Load`?")]),
+        ("from std_msgs.msg import Flot64", [("DRIVE107", "did you mean `Float64`?")]),
+        ("from own.msg import Load as L, Box", []),
+        ("from other.msg import Anything", []),
+        ("from .own.msg import Laod", []),
+    ],
+)
+def test_a_message_that_its_package_does_not_have(tmp_path: Path, imported: str, said: list[tuple[str, str]]) -> None:
+    (tmp_path / "msg/own/msg").mkdir(parents=True)
+    for name in ("Load", "Box"):
+        (tmp_path / f"msg/own/msg/{name}.msg").write_text("float64 data\n", "utf-8")
+    (tmp_path / "system.rcl").write_text(CONTRACT, "utf-8")
+    (tmp_path / "a.py").write_text(f"{imported}\n\n\nclass A:\n    pass\n", "utf-8")
+    plan = "messages: [msg]\nros: {distro: humble}\nnodes: {a: {source: {python: a.py, class: A}, methods: []}}\n"
+    (tmp_path / "plan.yaml").write_text(plan, "utf-8")
+    blocks = [b for b in avow("check", str(tmp_path), cwd=tmp_path).stdout.split("\n\n") if "[DRIVE107" in b]
+    assert [(b.partition("[")[2][:8], b.partition("help: ")[2].partition("\n")[0]) for b in blocks] == said
