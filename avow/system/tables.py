@@ -59,9 +59,12 @@ def csv_rows(data: bytes) -> list[tuple[int, tuple[str, ...]]]:
     text = data.decode("utf-8-sig").replace("\r\n", "\n").replace("\r", "\n")
     reader = csv.reader(io.StringIO(text, newline=""), strict=True)
     try:
-        return [(reader.line_num, tuple(cell.strip() for cell in row)) for row in reader if row]
+        rows = [(reader.line_num, tuple(cell.strip() for cell in row)) for row in reader if row]
     except csv.Error as error:
         raise ValueError(f"line {reader.line_num or 1}: {error}") from None
+    if rows and len(rows[0][1]) == 1 and (sign := next((sign for sign in ";\t" if sign in rows[0][1][0]), "")):
+        raise ValueError(f"line {rows[0][0]}: {sign!r} separates its columns: separate them by commas")
+    return rows
 
 
 def read_rows(name: str, piece: Piece) -> tuple[Table | None, tuple[Diagnostic, ...]]:

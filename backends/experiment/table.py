@@ -48,6 +48,8 @@ def read_table(path: Path) -> Table:
         needed = "a line with the names of the columns" if not lines else "at least one row below the names"
         raise Rejected(_fault(path, 1, "EXP111", f"the file needs {needed}"))
     (first, columns), *others = lines
+    if len(columns) == 1 and (sign := next((sign for sign in ";\t" if sign in columns[0]), "")):
+        raise Rejected(_fault(path, first, "EXP111", f"{sign!r} separates the columns", "separate them by commas"))
     twice = sorted({name for name in columns if columns.count(name) > 1})
     found = [_fault(path, first, "EXP112", f"the column '{name}' occurs twice") for name in twice]
     found += [
