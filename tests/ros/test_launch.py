@@ -191,6 +191,12 @@ def test_in_ros2_included_files_share_arguments_and_namespaces(tmp_path: Path) -
         ("a.py", "def generate_launch_description():\n  return LaunchDescription([f()])", 2, "f(…)"),
         (
             "a.py",
+            "def generate_launch_description():\n  return LaunchDescription([Node(name='a',\n paramters=[])])",
+            3,
+            "Node has no keyword `paramters`: did you mean `parameters`?",
+        ),
+        (
+            "a.py",
             "def generate_launch_description():\n  for n in 'ab':\n    Node(name=n)\n  return LaunchDescription([])",
             3,
             "this Node(…) is not read",

@@ -15,6 +15,7 @@ from pathlib import Path
 from avow.base.diagnostics import Diagnostic, Span
 from avow.base.python_names import unbound
 from avow.base.records import dataclass
+from avow.base.suggestions import nearest
 from avow.base.tuning.sizes import LAUNCH_ELEMENTS
 from avow.ros.launch.elements import VARIABLE, Element, Parsed, Text, Unread, WrongLaunch, joined, literal, unread
 
@@ -35,6 +36,9 @@ _RENAMED = {
     "plugin": "plugin",
 }
 """Keywords of nodes, and their names in XML."""
+_READ = ("remappings", "parameters", "arguments", "ros_arguments", "composable_node_descriptions")
+_OTHERS = (*_READ, "exec_name", "extra_arguments", "condition", "output", "prefix")
+"""Keywords with a name like one of those that are read."""
 _SILENT = frozenset(
     [
         "LogInfo",
@@ -216,6 +220,8 @@ class _Python:
                 children += self.actions(keyword.value)
             elif keyword.arg is None:
                 texts["args"] = Unread("its keywords are not written out")
+            elif keyword.arg not in _OTHERS and (near := nearest(keyword.arg, (*_RENAMED, *_READ), alike=0.75)):
+                self.tell(keyword.value, f"{_called(call)} has no keyword `{keyword.arg}`: did you mean `{near[0]}`?")
         return Element(tag, {**texts, **self.condition(call)}, tuple(children), self.at(call))
 
     def remaps(self, node: ast.expr) -> list[Element]:
