@@ -12,7 +12,7 @@ from dataclasses import fields, replace
 
 from avow.base.diagnostics import Diagnostic, Severity, Span
 from avow.base.records import dataclass
-from avow.base.suggestions import suggest
+from avow.base.suggestions import nearest, suggest
 from avow.language.contract import Node, Topic
 from avow.language.terms import Role
 from avow.ros.bags import NoBag
@@ -99,12 +99,8 @@ def _against_contract(node: Node, placed: Placed, code: Code) -> Iterator[Diagno
     topics = [(topic, *_base(placed, topic)) for topic in node.topics]
     known = {(name, plain) for _, name, _, plain in topics}
     ends = [(placed.resolved(end.name), end) for end in code.created if end.side != "declares"]
-    for name, end in ends:
-        if (name, end.side in _TOPICS) not in known and not is_plumbing(name) and not name.startswith("/tf"):
-            text = f"the code of {node.name} {_DOES[end.side]} {name}, which the contract does not declare"
-            hint = suggest(name, sorted({other for other, _ in known})) or "declare it under the node's `topics`"
-            notes = (("the contract's node is here", node.span),)
-            yield Diagnostic("ROS132", text, end.span, Severity.WARNING, hint, notes)
+    plumbing = [name for name, _ in ends if is_plumbing(name) or name.startswith("/tf")]
+    strange = {n: end for n, end in ends if (n, end.side in _TOPICS) not in known and n not in plumbing}
     for topic, name, kind, plain in topics:
         if is_plumbing(name) or kind.partition("/")[0] in OWN_CALLS:
             continue
@@ -113,11 +109,19 @@ def _against_contract(node: Node, placed: Placed, code: Code) -> Iterator[Diagno
         sides = _SIDES if topic.port is None or not plain else {topic.port.role: _SIDES[topic.port.role]}
         if not code.unread and not any(not plain or end.side in sides.values() for end in mine):
             does = _DOES["".join(sides.values())] if len(sides) == 1 else "creates"
-            shown = tuple((f"it {_DOES[end.side]} {at} here", end.span) for at, end in ends if end in mine or not mine)
-            hint = suggest(name, sorted({at for at, _ in ends})) or _CORRECT
+            near = nearest(name, strange)
+            meant = [(at, strange.pop(at)) for at in near]  # one misspelt name is one fault
+            meant += [(at, end) for at, end in ends if end in mine or not mine]
+            notes = tuple((f"it {_DOES[end.side]} {at} here", end.span) for at, end in meant[:1])
+            hint = suggest(name, near or sorted({at for at, _ in ends})) or _CORRECT
             yield Diagnostic(
-                "ROS133", f"the code of {node.name} never {does} {name}", topic.span, hint=hint, notes=shown[:1]
+                "ROS133", f"the code of {node.name} never {does} {name}", topic.span, hint=hint, notes=notes
             )
+    for name, end in strange.items():
+        text = f"the code of {node.name} {_DOES[end.side]} {name}, which the contract does not declare"
+        hint = suggest(name, sorted({other for other, _ in known})) or "declare it under the node's `topics`"
+        here = (("the contract's node is here", node.span),)
+        yield Diagnostic("ROS132", text, end.span, Severity.WARNING, hint, here)
 
 
 def _wrong_type(topic: Topic, name: str, kind: str, mine: Sequence[Created]) -> Iterator[Diagnostic]:
