@@ -121,6 +121,7 @@ _SHOWN = {
     *(("Clause", name) for name in ("sentence", "text", "position")),
     *(("Claim", name) for name in ("sentence", "formula", "severity", "clauses")),
     ("Port", "type_name"),
+    ("Port", "unit"),  # the formulas' units are checked where the contract is loaded
     ("EnumSort", "name"),
     *(("Plan", name) for name in ("system", "title")),
     *(("NodePlan", name) for name in ("criticality", "title")),
