@@ -363,6 +363,9 @@ RULES = (
     _rule("head", _WHY, _reasons),
     _rule("gates", _WHY, _reasons),
     _rule("head", r"SHA-(256)", lambda _f, m, _b: m.groups()),
+    # a digest, or its first characters, may be digits only
+    _rule("head", r"git HEAD (\d+)(?=,)", lambda f, _m, _b: (str(f.case["run"].get("revision")),)),
+    _rule("head", r"ledger (\d+)(?=,)", lambda f, _m, _b: (str(f.case["ledger_head"]),)),
     _rule("gates", r"\(([^()]*\d[^()]*)\)(?=: )", _policy),
     _rule("hazards", r"^ ␟ (.*?) ␟ (.*?)(?: \(security\))? ␟ .*? ␟ .*? weakest: (.*?); (.*?) ␟ ", _hazard),
     _rule("standard", r"(\d+) (served|partly served|open|outside)\b", _objectives),

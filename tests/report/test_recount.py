@@ -324,3 +324,12 @@ def test_it_is_a_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> 
     page.write_text(page.read_text().replace("policy: ", "policy: 1"))
     assert main([str(tmp_path)]) == 1
     assert "the evidence gives" in capsys.readouterr().out
+
+
+def test_a_revision_of_digits_alone_is_borne_out() -> None:
+    case = CASES["rate"]()
+    texts = dict(every_text(replace(case, run=replace(case.run, revision="658064233809"), ledger_head="123456789012")))
+    page, data = texts["index.html"], texts["report.json"].encode()
+    assert "git HEAD <code>658064233809</code>" in page
+    assert recounted(page, data) == []
+    assert recounted(page.replace("658064233809", "658064233808"), data)
