@@ -101,6 +101,17 @@ def find_tool(
     return Tool(name, _version(path, tuple(arguments), pattern), path, install, optional)
 
 
+def package_tool(name: str, install: str, line: str) -> Tool:
+    """An installed distribution, tried by a line of Python. Never raises."""
+    from importlib import metadata  # slow to import
+
+    try:
+        version = package_version(name)
+    except metadata.PackageNotFoundError:
+        return Tool(name, None, None, install, package=name)
+    return Tool(name, version, None, install, package=name, trial=functools.partial(works, line))
+
+
 @functools.cache
 def package_version(name: str) -> str:
     """The version of an installed distribution. Raises `importlib.metadata.PackageNotFoundError`."""

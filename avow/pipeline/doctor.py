@@ -5,12 +5,10 @@ from __future__ import annotations
 import shutil
 import sys
 from dataclasses import replace
-from functools import partial
-from importlib import metadata
 
 from avow.backend_kit.registry import backend, names
 from avow.base.records import dataclass
-from avow.base.tools import Tool, find_tool, works, z3_tool
+from avow.base.tools import Tool, find_tool, package_tool, z3_tool
 from avow.isolation.level import seals
 from avow.isolation.tracing import INSTALL, remedy, traces
 
@@ -86,8 +84,5 @@ def _try_bubblewrap() -> str:
 
 
 def _package(name: str, install: str, line: str) -> Tool:
-    try:
-        version = metadata.version(name)
-    except metadata.PackageNotFoundError:
-        return Tool(name, None, None, install)
-    return Tool(name, version, shutil.which(name), install, trial=partial(works, line))
+    found = package_tool(name, install, line)
+    return replace(found, path=shutil.which(name) if found.present else None)

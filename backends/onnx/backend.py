@@ -1,15 +1,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from functools import partial
-from importlib.metadata import PackageNotFoundError
 from pathlib import Path
 
 from avow.backend_kit.given import file_path, summarized
 from avow.backend_kit.protocol import Backend, Job, Limits, OutsideCheck, Report, Tool
 from avow.base.codes import Catalogue
 from avow.base.diagnostics import Diagnostic, Rejected
-from avow.base.tools import package_version, works
+from avow.base.tools import package_tool
 from avow.base.verdict import Link, Object, Verdict
 
 from .options import SCHEMA, read
@@ -45,7 +43,7 @@ class OnnxBackend(Backend):
     )
 
     def tools(self) -> tuple[Tool, ...]:
-        return tuple(_tool(name, line) for name, line in _TRIALS.items())
+        return tuple(package_tool(name, INSTALL, line) for name, line in _TRIALS.items())
 
     def check(self, job: Job) -> tuple[Diagnostic, ...]:
         try:
@@ -87,11 +85,3 @@ class OnnxBackend(Backend):
 
         outcomes, logs = settle(job, given, limits)
         return Report(outcomes, self.name, version, logs=logs)
-
-
-def _tool(name: str, line: str) -> Tool:
-    try:
-        version = package_version(name)
-    except PackageNotFoundError:
-        return Tool(name, None, None, INSTALL, package=name)
-    return Tool(name, version, None, INSTALL, package=name, trial=partial(works, line))

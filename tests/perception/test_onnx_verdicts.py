@@ -288,7 +288,7 @@ def test_without_the_extra_it_is_not_run(tmp_path: Path, monkeypatch: pytest.Mon
     def missing(name: str) -> str:
         raise PackageNotFoundError(name)
 
-    monkeypatch.setattr("avow.backends.onnx.backend.package_version", missing)
+    monkeypatch.setattr("avow.base.tools.package_version", missing)
     found = judged(tmp_path, "out.z == in.x", IDENTITY)
     assert found.verdict is Verdict.NOT_RUN
     assert "pip install 'avow[perception]'" in found.summary
