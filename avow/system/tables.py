@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import re
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -54,6 +55,11 @@ def cell_place(table: Table, text: str) -> Span | None:
     return next((Span(str(table.path), line, 1, line + 1, 1) for line in lines), None)
 
 
+def other_separator(header: Sequence[str]) -> str:
+    """What seems to separate the columns in place of a comma: a semicolon or a tab; empty if nothing does."""
+    return next((sign for sign in ";\t" if len(header) == 1 and sign in header[0]), "")
+
+
 def csv_rows(data: bytes) -> list[tuple[int, tuple[str, ...]]]:
     """The rows of a CSV file that are not empty, each with the line on which it ends. Raises ValueError."""
     text = data.decode("utf-8-sig").replace("\r\n", "\n").replace("\r", "\n")
@@ -62,7 +68,7 @@ def csv_rows(data: bytes) -> list[tuple[int, tuple[str, ...]]]:
         rows = [(reader.line_num, tuple(cell.strip() for cell in row)) for row in reader if row]
     except csv.Error as error:
         raise ValueError(f"line {reader.line_num or 1}: {error}") from None
-    if rows and len(rows[0][1]) == 1 and (sign := next((sign for sign in ";\t" if sign in rows[0][1][0]), "")):
+    if rows and (sign := other_separator(rows[0][1])):
         raise ValueError(f"line {rows[0][0]}: {sign!r} separates its columns: separate them by commas")
     return rows
 

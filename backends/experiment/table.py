@@ -12,6 +12,7 @@ from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.base.plain import alike
 from avow.base.records import dataclass
 from avow.base.suggestions import suggest
+from avow.system.tables import other_separator
 
 from .tuning import ROWS, TABLE_BYTES
 
@@ -48,7 +49,7 @@ def read_table(path: Path) -> Table:
         needed = "a line with the names of the columns" if not lines else "at least one row below the names"
         raise Rejected(_fault(path, 1, "EXP111", f"the file needs {needed}"))
     (first, columns), *others = lines
-    if len(columns) == 1 and (sign := next((sign for sign in ";\t" if sign in columns[0]), "")):
+    if sign := other_separator(columns):
         raise Rejected(_fault(path, first, "EXP111", f"{sign!r} separates the columns", "separate them by commas"))
     twice = sorted({name for name in columns if columns.count(name) > 1})
     found = [_fault(path, first, "EXP112", f"the column '{name}' occurs twice") for name in twice]
