@@ -5,13 +5,15 @@ from __future__ import annotations
 
 import ast
 import contextlib
-from collections.abc import Iterator, Mapping
+import functools
+from collections.abc import Callable, Iterator, Mapping
 
 from avow.base.diagnostics import Diagnostic, Severity, Span
 from avow.base.files import inside, read_regular
 from avow.base.plain import count
 from avow.base.python_names import unbound
 from avow.base.suggestions import suggest
+from avow.ros.definitions import Message
 from avow.ros.sources import definitions
 from avow.system.plan import Plan
 
@@ -31,6 +33,7 @@ be."""
 def misused(plan: Plan) -> Iterator[Diagnostic]:
     """Callbacks that do not take what ROS calls them with, and a warning for each name that nothing defines, in the
     Python files that the plan names as sources. A file that is no Python is left to the methods."""
+    messages = functools.cache(lambda: definitions(plan.messages, plan.ros.distro)[0].messages)  # read if a file asks
     for entry in plan.nodes:
         path = inside(plan.root, entry.source.python) if entry.source and entry.source.python else None
         if path is None:
@@ -38,17 +41,17 @@ def misused(plan: Plan) -> Iterator[Diagnostic]:
         with contextlib.suppress(OSError, SyntaxError, ValueError, RecursionError):
             tree = ast.parse(read_regular(path))
             yield from _callbacks(tree, str(path))
-            yield from _imports(tree, str(path), plan)
+            yield from _imports(tree, str(path), messages)
             for name, hint in unbound(tree):
                 message = f"`{name.id}` is not defined: the file neither imports nor assigns it"
                 yield Diagnostic("DRIVE106", message, _span(name, str(path)), Severity.WARNING, hint)
 
 
-def _imports(tree: ast.Module, file: str, plan: Plan) -> Iterator[Diagnostic]:
+def _imports(tree: ast.Module, file: str, messages: Callable[[], Mapping[str, Message]]) -> Iterator[Diagnostic]:
     """A warning for each message that is imported from a known package without it."""
     wanted = [(node, part) for node in ast.walk(tree) if isinstance(node, ast.ImportFrom) for part in node.names]
     wanted = [(node, part) for node, part in wanted if (node.module or "").endswith(".msg") and not node.level]
-    known = definitions(plan.messages, plan.ros.distro)[0].messages if wanted else {}
+    known = messages() if wanted else {}
     for node, part in wanted:
         package = (node.module or "").removesuffix(".msg")
         own = [name.removeprefix(f"{package}/") for name in known if name.startswith(f"{package}/")]

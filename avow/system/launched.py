@@ -103,8 +103,9 @@ def _parameters(plan: Plan, node: Node, launched: Started) -> Iterator[Diagnosti
 
     of_contract = {port.name for port in node.parameters}  # the class is run with the launch file's value
     there = {name: it for name, it in there.items() if name in here or name.replace(".", "_") not in of_contract}
-    text = read_regular(path) if (path := plan.root / source.python).is_file() else b""
-    ignored = {s.name for s in launched.parameters if s.shared and s.name.encode() not in text} | {*OF_EVERY_NODE}
+    shared = [setting.name for setting in launched.parameters if setting.shared]
+    text = read_regular(path) if shared and (path := plan.root / source.python).is_file() else b""
+    ignored = {*OF_EVERY_NODE, *(name for name in shared if name.encode() not in text)}
     there = {name: it for name, it in there.items() if name in here or not {name, name.partition(".")[0]} & ignored}
     alone = sorted(here.keys() - there.keys()) if there and not unread else []
     for name, (value, span) in there.items():
