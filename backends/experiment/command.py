@@ -11,7 +11,7 @@ from typing import Any
 import click
 
 from avow.backend_kit.given import file_path, misshapen
-from avow.backend_kit.protocol import Job
+from avow.backend_kit.protocol import Job, Limits
 from avow.base.codec import document
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.plain import count
@@ -42,9 +42,6 @@ from .profile import Campaign, Run, read_campaign
 from .searching import Cells, Searched, Tried, search
 from .tuning import SEARCH_RUNS
 from .verdict import settle
-
-SECONDS = 60.0
-"""The limit of a run, unless the plan gives `seconds`."""
 
 
 @click.command()
@@ -98,7 +95,9 @@ class _Work:
     """The runs of the search that broke an assumption."""
 
     def perform(self, run: Run) -> Made:
-        row, told = perform(self.job, self.campaign, run, float(self.job.method.options.data.get("seconds", SECONDS)))
+        row, told = perform(
+            self.job, self.campaign, run, float(self.job.method.options.data.get("seconds", Limits().seconds))
+        )
         made = self.judge(row)
         if not self.silent:
             click.echo(" ".join(filter(None, (_line(made), f"({told})" if told else ""))))
