@@ -75,7 +75,7 @@ class Rows(Backend):
 
 def read(job: Job) -> list[dict[str, Value]]:
     """The rows, as values of the node's ports. Raises Rejected."""
-    path = existing_file(job, "answers", job.options.get("answers"), wrong="ROWS101", absent="ROWS102")
+    path = existing_file(job, "answers", str(job.options.get("answers") or ""), wrong="ROWS101", absent="ROWS102")
     names = [port.variable.qualified for port in (*job.node.inputs, *job.node.outputs)]
     try:
         with path.open(newline="", encoding="utf-8") as file:

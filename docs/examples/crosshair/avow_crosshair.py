@@ -149,8 +149,7 @@ def looked(
         command = [sys.executable, "-P", "-B", "-m", "crosshair", "check", "--analysis_kind=asserts", "--report_all"]
         command += [f"--max_uninteresting_iterations={iterations}", str(file)]
         if level is Isolation.SEALED:
-            shown = (file.parent, job.root.resolve(), Path(sys.prefix), Path(sys.base_prefix))
-            command = sealed(command, shown, "/tmp/avow-scratch")
+            command = sealed(command, file.parent)
         environment = {"PYTHONHASHSEED": "0", "PYTHONPATH": "", "COLUMNS": "1000"}
         done = run(command, cwd=file.parent, seconds=limits.seconds * 0.7, megabytes=limits.megabytes, env=environment)
         if done.timed_out:
