@@ -31,6 +31,8 @@ _WORD = re.compile(r"\w+'*")
 _STRING = re.compile(r'"[^"\n]*"|//[^\n]*')
 _OF_NAMES = re.compile("RCL[23]")
 _QUOTED = re.compile(r"'([^']*)'")
+_NODE = re.compile(r"\s*node\b")
+_NAMELESS = ("RCL001", "RCL215", "RCL219")
 _KEY = re.compile(r"\b(\w+)[:`]")
 
 
@@ -50,6 +52,8 @@ class Rest:
     """Names of the contract that may be missing only because of a fault in it."""
     wrong: frozenset[tuple[str | int, ...]] = frozenset()
     """The paths of the plan's faulty values."""
+    lost: bool = False
+    """Whether a declaration has no name of its own: its node cannot be read, or its name is given twice."""
 
     def may_follow(self, found: Diagnostic, node: str = "") -> bool:
         """Whether a finding (about a node's method) may follow from a reported fault: of the contract, or of a value of
@@ -57,7 +61,7 @@ class Rest:
         meant = _KEY.findall(found.hint or "")
         near = (path for path in self.wrong if path[0] != "nodes" or path[1:2] == (node,))
         keys = {[step for step in path if isinstance(step, str)][-1] for path in near}
-        return not keys.isdisjoint(meant) or not self.doubtful.isdisjoint(_WORD.findall(found.message))
+        return self.lost or not keys.isdisjoint(meant) or not self.doubtful.isdisjoint(_WORD.findall(found.message))
 
 
 def rest_of(folder: Path) -> Rest | None:
@@ -74,7 +78,8 @@ def rest_of(folder: Path) -> Rest | None:
         return Rest(System(plan, contract), True, root, dropped, faults, wrong=wrong)
     words = frozenset(word for path in plan.contract_files for word in _WORD.findall(_text(path)))
     part = read_in_part(plan.contract_files)
-    return Rest(System(plan, part), False, root, dropped | words, faults, _doubtful(plan, part, found), wrong)
+    lost = any(d.code in _NAMELESS or _begins_node(d) for d in found if d.is_error)
+    return Rest(System(plan, part), False, root, dropped | words, faults, _doubtful(plan, part, found), wrong, lost)
 
 
 def every_fault(folder: Path, found: Iterable[Diagnostic]) -> tuple[Diagnostic, ...]:
@@ -87,7 +92,7 @@ def every_fault(folder: Path, found: Iterable[Diagnostic]) -> tuple[Diagnostic, 
         if (folder / "plan.yaml").is_file():
             told += [d for d in check_paths(sorted(folder.resolve().glob("*.rcl")))[1] if d.is_error]
         return in_order(told)
-    return in_order([*told, *rest.found, *(d for d in _of_names(rest) if not _follows(d, rest.told))])
+    return in_order([*told, *rest.found, *(d for d in _of_names(rest) if not _follows(d, rest))])
 
 
 def in_order(found: Iterable[Diagnostic]) -> tuple[Diagnostic, ...]:
@@ -113,6 +118,14 @@ def _doubtful(plan: Plan, part: Contract, found: Iterable[Diagnostic]) -> frozen
             lines = [line for at, line in enumerate(lines, 1) if any(s.line <= at <= s.end_line for s in here)]
         names |= {word for line in lines for word in _WORD.findall(line)}
     return frozenset(names - nodes - set(KEYWORDS))
+
+
+def _begins_node(found: Diagnostic) -> bool:
+    """Whether the fault lies in the line in which a node begins."""
+    if found.span is None:
+        return False
+    lines = _text(Path(found.span.file)).splitlines()[found.span.line - 1 :]
+    return bool(lines) and _NODE.match(lines[0]) is not None
 
 
 def _of_names(rest: Rest) -> Iterator[Diagnostic]:
@@ -162,11 +175,11 @@ def _tried(look: Callable[[], Iterable[Diagnostic]]) -> Iterable[Diagnostic]:
         return rejected.diagnostics
 
 
-def _follows(found: Diagnostic, told: frozenset[str]) -> bool:
-    """Whether every name that it misses is a word that a reported fault concerns."""
+def _follows(found: Diagnostic, rest: Rest) -> bool:
+    """Whether it misses names that a faulty contract may have lost, or that a reported fault concerns."""
     names = _QUOTED.findall(found.message)
     last = [_WORD.findall(name)[-1] for name in names if _WORD.search(name)]
-    return found.code == "PLAN106" and bool(last) and set(last) <= told
+    return found.code == "PLAN106" and (rest.lost or (bool(last) and set(last) <= rest.told))
 
 
 def _text(path: Path) -> str:

@@ -102,7 +102,7 @@ def _table(data: bytes, file: str) -> tuple[Piece, tuple[Diagnostic, ...]]:
 
 def _hazard(name: str, span: Span, entry: Piece) -> Hazard:
     said: dict[str, Any] = {**entry.words(), **{key: entry.texts(key) for key in _LISTS}}
-    return Hazard(name, span=span, **said)
+    return Hazard(name, span=span, mitigation_spans=tuple(p.span for p in entry.each("mitigated_by")), **said)
 
 
 def check_mitigations(plan: Plan, nodes: Mapping[str, Node]) -> Iterator[Diagnostic]:
@@ -112,8 +112,8 @@ def check_mitigations(plan: Plan, nodes: Mapping[str, Node]) -> Iterator[Diagnos
     known += [f"{node.name}.{port.name}" for node in nodes.values() for port in node.inputs]
     known += [f"{entry.node}/{method.id}" for entry in plan.nodes for method in entry.methods]
     for hazard in plan.hazards:
-        for name in hazard.mitigated_by:
+        for name, span in zip(hazard.mitigated_by, hazard.mitigation_spans, strict=True):
             if name not in known:
                 kinds = "requirement, node, guarantee, input or method"
                 message = f"hazard {hazard.id}: mitigated by {name!r}, which is no {kinds}"
-                yield Diagnostic("PLAN106", message, hazard.span, hint=suggest(name, known))
+                yield Diagnostic("PLAN106", message, span, hint=suggest(name, known))

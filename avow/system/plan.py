@@ -329,6 +329,7 @@ class Hazard:
     consequences: tuple[str, ...] = ()
     mitigated_by: tuple[str, ...] = ()
     """Requirements, nodes, guarantees (``node.guarantee``) or methods (``node/method``)."""
+    mitigation_spans: tuple[Span, ...] = field(default=(), compare=False, repr=False)
     span: Span | None = field(default=None, compare=False, repr=False)
 
 

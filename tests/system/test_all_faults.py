@@ -158,6 +158,22 @@ def test_of_any_faults_all_are_told_and_nothing_else(seed: int, tmp_path: Path) 
     assert alike(found, expected(chosen)), (chosen, found)
 
 
+@pytest.mark.parametrize(
+    ("old", "new", "code"),
+    [
+        ("node thermostat {", "node thermo-stat {", "RCL113"),
+        ("node thermostat {", "node thermometer {", "RCL219"),
+        (CONTRACT, "", "RCL001"),
+    ],
+)
+def test_what_a_lost_declaration_takes_along_is_no_fault_of_the_plan(
+    old: str, new: str, code: str, tmp_path: Path
+) -> None:
+    folder = place(tmp_path, [])
+    (folder / "system.rcl").write_text(CONTRACT.replace(old, new))
+    assert {told for _, told in check(folder)} == {code}
+
+
 def test_without_faults_there_is_a_system(tmp_path: Path) -> None:
     assert load_system(place(tmp_path, [])).name == "home"
     assert check(tmp_path) == []
