@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import fields, replace
+from pathlib import Path
 
 from avow.base.diagnostics import Diagnostic, Severity, Span
 from avow.base.records import dataclass
@@ -24,7 +25,7 @@ from avow.ros.names import Placed
 from avow.ros.parameters import OF_EVERY_NODE, flat
 from avow.ros.quality import Quality, Recorded, recorded, unmet
 from avow.system.launched import where
-from avow.system.node_plan import parameters
+from avow.system.node_plan import parameter_place, parameters
 from avow.system.plan import Driving, NodeEnds, Plan, Source, System
 
 _CORRECT = "correct the contract's topic, the plan's `ros`, or the code"
@@ -138,9 +139,9 @@ def _never_declared(plan: Plan, source: Source, placed: Placed, code: Code) -> I
     values, wrong = parameters(plan.root, source, placed.name)
     for name, _ in () if wrong else flat(values):
         if name not in declared and name.partition(".")[0] not in OF_EVERY_NODE:
-            text = f"`{source.parameters}` sets {name}, which {source.class_name} never declares"
+            span = parameter_place(plan.root, source, placed.name, name)
+            text = f"`{Path(span.file).name}` sets {name}, which {source.class_name} never declares"
             hint = suggest(name, declared) or "correct its name, or remove it"
-            span = source.place.at("source", "parameters")
             yield Diagnostic("PLAN136", text, span, Severity.WARNING, hint)
 
 

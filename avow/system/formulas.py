@@ -91,7 +91,7 @@ def environment_assumptions(system: System, graph: Graph) -> tuple[Assumed, ...]
             providers = [str(each.source) for some in heard for each in some]
             what = f"{', '.join(providers)} provides it" if providers else "all that read it are named apart"
             message = f"environment: {entry.port} is no environment input: {what}"
-            faults.append(Diagnostic("PLAN113", message, entry.span))
+            faults.append(Diagnostic("PLAN113", message, entry.span, hint="remove this entry" if edges else None))
             continue
         if entry.assume is None:
             continue

@@ -95,14 +95,15 @@ def _parameters(plan: Plan, node: Node, launched: Started) -> Iterator[Diagnosti
     mine, wrong = parameters(plan.root, source, launched.name)
     if wrong:
         return  # reported where the class is examined
-    here = dict(flat(mine))
+    of_contract = {port.name for port in node.parameters}  # avow.system.parameters compares what sets these
+    here = {name: value for name, value in flat(mine) if name.replace(".", "_") not in of_contract}
     there, unread = started_with(launched)
 
     def place(name: str) -> Span:
         return parameter_place(plan.root, source, launched.name, name)
 
-    of_contract = {port.name for port in node.parameters}  # the class is run with the launch file's value
-    there = {name: it for name, it in there.items() if name in here or name.replace(".", "_") not in of_contract}
+    known = [*there, *of_contract]
+    there = {name: it for name, it in there.items() if name.replace(".", "_") not in of_contract}
     shared = [setting.name for setting in launched.parameters if setting.shared]
     text = read_regular(path) if shared and (path := plan.root / source.python).is_file() else b""
     ignored = {*OF_EVERY_NODE, *(name for name in shared if name.encode() not in text)}
@@ -116,10 +117,13 @@ def _parameters(plan: Plan, node: Node, launched: Started) -> Iterator[Diagnosti
             alone = [other for other in alone if other not in meant]
             hint = "write what the robot is started with into the file that the plan names:  source: {parameters: …}"
             hint = f"the plan has `{meant[0]}`: correct the one that is wrong" if meant else hint
-            yield Diagnostic("ROS127", message, place(name), hint=hint, notes=((where(span), span),))
+            hint = f"did you mean `{near[0]}`?" if (near := nearest(name, of_contract)) else hint
+            yield Diagnostic("ROS127", message, span if near else place(name), hint=hint, notes=((where(span), span),))
     for name in alone:
         message = f"the plan sets {name} of {node.name}, and {where(launched.span)} starts it without"
-        yield Diagnostic("ROS127", message, place(name), hint="leave it out, or launch with it")
+        near = nearest(name, known)
+        hint = f"did you mean `{near[0]}`?" if near else "leave it out, or launch with it"
+        yield Diagnostic("ROS127", message, place(name), hint=hint)
 
 
 def started_with(launched: Started) -> tuple[dict[str, tuple[Any, Span]], tuple[Diagnostic, ...]]:

@@ -150,7 +150,7 @@ def parameters(root: Path, source: Source, name: str) -> tuple[Mapping[str, Any]
     told = ((_unclear(piece, value, key), piece.span) for key, (value, piece) in found.items())
     wrong = [Diagnostic("PLAN130", f"`{source.parameters}`: {why}", span) for why, span in told if why]
     own = source.values
-    for key in sorted(own.keys() & found.keys()):
+    for key in sorted(own.keys() & found.keys() & source.place.data.get("parameters", {}).keys()):
         value, piece = found[key]
         if own[key] != value or isinstance(own[key], bool) is not isinstance(value, bool):
             message = f"the plan sets {key} to {own[key]!r}, and `{source.parameters}` to {value!r}"
@@ -159,7 +159,10 @@ def parameters(root: Path, source: Source, name: str) -> tuple[Mapping[str, Any]
 
 
 def parameter_place(root: Path, source: Source, name: str, key: str) -> Span:
-    """Where the parameter file sets a parameter of the node of this whole name; otherwise where the plan names it."""
+    """Where the plan or its parameter file sets a parameter of the node of this whole name; otherwise where the plan
+    names the file."""
+    if key in source.values and key in source.place.data.get("parameters", {}):
+        return source.place.key("parameters", key)
     with contextlib.suppress(Rejected, KeyError):
         return _settings(root, source, name)[1][key][1].span
     return source.place.at("source", "parameters")

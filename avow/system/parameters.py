@@ -27,7 +27,7 @@ from avow.language.subterms import ports_of
 from avow.ros.code import read_code
 from avow.ros.parameters import flat
 from avow.system.launched import started_with, where
-from avow.system.node_plan import parameters
+from avow.system.node_plan import parameter_place, parameters
 from avow.system.plan import Driving, EnvironmentInput, NodePlan, Numbers, Plan
 
 OPEN = "the plan gives it no value: what is shown holds for each value that the contract's assumptions allow"
@@ -96,25 +96,24 @@ def _node(plan: Plan, node: Node, faults: list[Diagnostic]) -> tuple[Node, Mappi
         if port.value is not None:
             given.insert(0, _Given(port.name, plain(decimal(port.value)), "the included system", None))
         given = [one for one in given if not one.default] or given
-        for one in given:
-            value = _term(one.value, port.sort)
-            if value is None:
-                message = f"{node.name}.{port.name} is of type {port.type_name}, and {one.by} sets it to {one.value!r}"
-                faults.append(Diagnostic("PLAN139", message, one.span, notes=_declared(port)))
-            elif one is given[0]:
-                run_with[one.name], places[port.name] = one.value, one.span
-                if port.value is None:
-                    fixed.append(replace(port, value=_as_run(value, entry)))
-        others = [one for one in given[1:] if _term(one.value, port.sort) != _term(given[0].value, port.sort)]
+        unfit = [one for one in given if _term(one.value, port.sort) is None]
+        for one in unfit:
+            said = "gives it no value" if one.value is None else f"sets it to {one.value!r}"
+            message = f"{node.name}.{port.name} is of type {port.type_name}, and {one.by} {said}"
+            faults.append(Diagnostic("PLAN139", message, one.span, notes=_declared(port)))
+        if unfit or not given:
+            continue
+        first, value = given[0], _term(given[0].value, port.sort)
+        run_with[first.name], places[port.name] = first.value, first.span
+        if port.value is None and value is not None:
+            fixed.append(replace(port, value=_as_run(value, entry)))
+        others = [one for one in given[1:] if _term(one.value, port.sort) != value]
         if others:
-            said = "; ".join(f"{one.by} sets it to {one.value!r}" for one in (given[0], *others))
+            said = "; ".join(f"{one.by} sets it to {one.value!r}" for one in (first, *others))
             notes = tuple((one.by, one.span) for one in others if one.span is not None)
             message = f"the value of {node.name}.{port.name} is not clear: {said}"
-            faults.append(
-                Diagnostic(
-                    "PLAN139", message, given[0].span or others[0].span, hint="give one value, once", notes=notes
-                )
-            )
+            span = first.span or others[0].span
+            faults.append(Diagnostic("PLAN139", message, span, hint="give one value, once", notes=notes))
     return (with_values(node, tuple(fixed), faults, places) if fixed else node), run_with
 
 
@@ -130,9 +129,10 @@ def _sources(plan: Plan, node: Node) -> Iterator[_Given]:
         yield _Given(name, value, "the plan", entry.parameters.at(name))
     source, sure = entry.source, plan.launched is None or not plan.launched.unread
     if source is not None and source.parameters:
-        read, _ = parameters(plan.root, replace(source, values={}), placed.name)  # faults: where the class is examined
-        span = source.place.at("source", "parameters")
-        yield from (_Given(name, value, source.parameters, span) for name, value in flat(read))
+        of_file = replace(source, values={})
+        read, _ = parameters(plan.root, of_file, placed.name)  # faults: where the class is examined
+        for name, value in flat(read):
+            yield _Given(name, value, source.parameters, parameter_place(plan.root, of_file, placed.name, name))
     for one in plan.launched.nodes if plan.launched is not None else ():
         if one.name == placed.name:
             there, unread = started_with(one)

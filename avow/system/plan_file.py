@@ -250,7 +250,7 @@ class _PlanReader:
                 )
 
     def environment(self) -> Iterator[EnvironmentInput]:
-        for port, _, piece in self.root.keyed("environment"):
+        for port, span, piece in self.root.keyed("environment"):
             assume, constant = piece.at("assume"), piece.at("constant")
             if assume is None and constant is not None and constant.entries is not None:
                 message = f"environment.{port}: constant has words of its own only beside an assume"
@@ -259,7 +259,7 @@ class _PlanReader:
                 port,
                 assume.text if assume else None,
                 piece.said("because"),
-                piece.span,
+                span,
                 constant is not None and constant.value is not False,
                 piece.said(*(("because",) if assume is None else ("constant", "because"))) or "",
                 assume.inner if assume else None,

@@ -92,7 +92,7 @@ FAULTS: list[tuple[list[tuple[str, str, str]], list[str]]] = [
     ([("watch.py", "SetBool", "Trigger")], ["ROS133e system.rcl:12 watch.py:11"]),
     ([("camera.cpp", "create_publisher", "create_subscription")], ["ROS133e system.rcl:5 camera.cpp:4"]),
     ([("camera.cpp", '"scan"', "name()")], ["ROS134n camera.cpp:4"]),
-    ([("watch.yaml", "fastest", "fasted")], ["PLAN136w plan.yaml:6"]),
+    ([("watch.yaml", "fastest", "fasted")], ["PLAN136w watch.yaml:1"]),
 ]
 
 
