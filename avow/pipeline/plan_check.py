@@ -21,7 +21,7 @@ from avow.pipeline.methods import method_backend, method_job
 from avow.pipeline.work import ENGINES
 from avow.system import code_ends, launched
 from avow.system.driven import misused
-from avow.system.faults import rest_of
+from avow.system.faults import rest_of, without_followers
 from avow.system.graph import dataflow
 from avow.system.node_plan import never_read
 from avow.system.parameters import with_parameters
@@ -71,7 +71,9 @@ def of_plan(
                 found += said
                 if clean is not None and not said:
                     clean.add(name)
-    return tuple(d for d in dict.fromkeys(found) if d.is_error or d.code not in system.plan.lints_off)
+    return tuple(
+        d for d in without_followers(dict.fromkeys(found)) if d.is_error or d.code not in system.plan.lints_off
+    )
 
 
 def left_out(system: System) -> tuple[Diagnostic, ...]:

@@ -57,7 +57,7 @@ def _imports(tree: ast.Module, file: str, messages: Callable[[], Mapping[str, Me
         own = [name.removeprefix(f"{package}/") for name in known if name.startswith(f"{package}/")]
         if own and part.name not in (*own, "*"):
             at = Span(file, part.lineno, part.col_offset + 1, part.lineno, part.col_offset + 1 + len(part.name))
-            message = f"{package} has no message {part.name!r}"
+            message = f"there is no message {package}/{part.name}"
             yield Diagnostic("DRIVE107", message, at, Severity.WARNING, suggest(part.name, own))
 
 

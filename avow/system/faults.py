@@ -8,10 +8,11 @@ is never verified. Faults that may merely follow from a reported one are left ou
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 
-from avow.base.diagnostics import Diagnostic, Rejected
+from avow.base.diagnostics import Diagnostic, Rejected, Severity
 from avow.base.files import read_regular
 from avow.base.records import dataclass
 from avow.language.contract import Contract
@@ -33,6 +34,9 @@ _OF_NAMES = re.compile("RCL[23]")
 _QUOTED = re.compile(r"'([^']*)'")
 _NODE = re.compile(r"\s*node\b")
 _NAMELESS = ("RCL001", "RCL215", "RCL219")
+_CAUSES = ("PLAN105", "ROS101", "ROS111", "ROS104", "DRIVE101")
+_PACKAGE = re.compile(r"the package (\w+)")
+_TYPE = re.compile(r"\b(\w+)/(?:(?:msg|srv|action)/)?([A-Z]\w*?)(?:_(?:Request|Response|Goal|Result|Feedback))?\b")
 _KEY = re.compile(r"\b(\w+)[:`]")
 
 
@@ -97,13 +101,47 @@ def every_fault(folder: Path, found: Iterable[Diagnostic]) -> tuple[Diagnostic, 
 
 def in_order(found: Iterable[Diagnostic]) -> tuple[Diagnostic, ...]:
     """Each fault once, file by file from top to bottom; a file that is not there once."""
-    told = list(found)
+    told = list(without_followers(found))
     absent = {name for d in told if d.code == "PLAN107" for name in _QUOTED.findall(d.message)[:1]}
     told = [d for d in told if d.code == "PLAN107" or absent.isdisjoint(re.findall("['`]([^'`]+)['`]", d.message))]
     once = {(d.code, d.span.line if d.span else 0, d.message): d for d in told}
     return tuple(
         sorted(once.values(), key=lambda d: (d.span.file, d.span.line, d.span.column) if d.span else ("", 0, 0))
     )
+
+
+def without_followers(found: Iterable[Diagnostic]) -> tuple[Diagnostic, ...]:
+    """Leaves out each finding about an undefined type of messages if another finding says why: a faulty definition, two
+    names for the type of one topic, or a package that is not there. A warning that explains an error becomes one."""
+    told = list(found)
+    causes: dict[str, Diagnostic] = {}
+    for code in _CAUSES:
+        for d in told:
+            if d.code == code and (code != "PLAN105" or d.message.startswith("ros.distro")):
+                names = [""] if code == "PLAN105" else _types(d.message)
+                causes |= {name: d for name in names if not _explained(name, causes)}
+    kept: list[Diagnostic] = []
+    blamed: set[Diagnostic] = set()
+    for d in told:
+        why = None
+        if d.code == "DRIVE107" or "nothing defines" in d.message or "neither `messages`" in d.message:
+            why = next((it for name in _types(d.message) if (it := _explained(name, causes)) is not None), None)
+        elif d.code == "ROS133":  # what the code does with the topic cannot be compared
+            why = next((it for it in causes.values() if it.code == "ROS104" and it.span == d.span), None)
+        if why is None or why.code == d.code:
+            kept.append(d)
+        elif d.is_error:
+            blamed.add(why)
+    return tuple(replace(d, severity=Severity.ERROR) if d in blamed else d for d in kept)
+
+
+def _types(message: str) -> list[str]:
+    """The types that a finding names, without the parts of calls; a package alone ends with ``/``."""
+    return ["/".join(it) for it in _TYPE.findall(message)] + [f"{package}/" for package in _PACKAGE.findall(message)]
+
+
+def _explained(name: str, causes: Mapping[str, Diagnostic]) -> Diagnostic | None:
+    return next((causes[key] for key in (name, f"{name.partition('/')[0]}/", "") if key in causes), None)
 
 
 def _doubtful(plan: Plan, part: Contract, found: Iterable[Diagnostic]) -> frozenset[str]:

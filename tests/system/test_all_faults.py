@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from random import Random
 
@@ -12,9 +13,10 @@ import pytest
 from click.testing import CliRunner
 from helpers import some
 
-from avow.base.diagnostics import Rejected
+from avow.base.diagnostics import Diagnostic, Rejected, Severity
 from avow.cli import command, main
 from avow.pipeline.workload import survey
+from avow.system.faults import without_followers
 from avow.system.load import load_system
 
 CONTRACT = """\
@@ -251,6 +253,26 @@ def test_wrong_types_remaps_and_publishers_are_told_by_check_in_one_round(
         code for code in ("PLAN105", "PLAN106", "ROS101", "ROS111", "ROS112", "ROS115") if f"error[{code}]" in output
     }
     assert told == {"PLAN105", "PLAN106", "ROS101", "ROS111", "ROS112", "ROS115"}
+
+
+@pytest.mark.parametrize(
+    ("cause", "follower", "kept"),
+    [
+        (("ROS101", "a/B: a .srv has 2 parts"), ("MON101", "nothing defines the messages a/B_Request of x"), False),
+        (("ROS101", "a/B: a .srv has 2 parts"), ("MON101", "nothing defines the messages a/C of x"), True),
+        (("ROS101", "a/B: a .srv has 2 parts"), ("MON101", "a/B has no field x"), True),
+        (("ROS111", "/t is a/Bb at n, and a/B at m"), ("DRIVE101", "nothing defines a/Bb"), False),
+        (("DRIVE101", "neither `messages` nor the distribution has the package a, of a/B"), ("DRIVE107", "a/C"), False),
+        (("PLAN105", "ros.distro: 'humbel' is not one of"), ("DRIVE101", "neither `messages` nor a/B"), False),
+        (("PLAN105", "answers.by: 'stmp' is not one of"), ("DRIVE101", "neither `messages` nor a/B"), True),
+    ],
+)
+def test_what_a_faulty_definition_takes_along_is_one_error(
+    cause: tuple[str, str], follower: tuple[str, str], kept: bool
+) -> None:
+    first, second = Diagnostic(*cause, severity=Severity.WARNING), Diagnostic(*follower)
+    found = without_followers([second, first])
+    assert found == ((second, first) if kept else (replace(first, severity=Severity.ERROR),))
 
 
 @pytest.mark.parametrize(
