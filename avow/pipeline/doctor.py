@@ -19,8 +19,8 @@ _PACKAGES = (
     ),
     ("PDF report", "typst", "pip install typst", "import typst; assert typst.compile(b'x')[:4] == b'%PDF'"),
     (
-        *("live monitoring", "websockets", "pip install 'avow[monitor]'"),
-        "from websockets.sync import client, server; server.serve(print, '127.0.0.1', 0).socket.close()",
+        *("ROSMonitoring's oracle", "websockets", "pip install 'avow[monitor]'"),
+        "from websockets.sync import server; server.serve(print, '127.0.0.1', 0).socket.close()",
     ),
     (
         *("ROS 2 over DDS", "cyclonedds", "pip install 'avow[dds]'"),

@@ -50,7 +50,7 @@ from .watched import Violation, coverage, silent_topic
 @click.option(
     "--live",
     metavar="GRAPH",
-    help="Judge a running graph: ros1[:http://host:11311], ros2[:DOMAIN] (over DDS), rosbridge:ws://host:9090.",
+    help="Judge a running graph: ros1[:http://host:11311], ros2[:DOMAIN] (over DDS).",
 )
 @click.option(
     "--for", "seconds", type=click.FloatRange(min=0), help="With --live: for so many seconds (else until Ctrl-C)."

@@ -1,2 +1,2 @@
-"""Judging while it runs: the participants of a graph (`ros1`, `dds`, `rosbridge`), the loop that judges their messages
-(`follow`), and ROSMonitoring's oracle (`serve`)."""
+"""Judging while it runs: the participants of a graph (`ros1`, `dds`), the loop that judges their messages (`follow`),
+and ROSMonitoring's oracle (`serve`)."""

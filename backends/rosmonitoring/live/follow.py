@@ -22,7 +22,6 @@ from ..watched import Violation, coverage
 from .dds import Dds
 from .graphs import ERROR, OK, STALE, WARN, Graph, Heard, Status
 from .ros1 import Ros1, master_of
-from .rosbridge import Rosbridge
 
 UNORDERED = (
     "the topics of a running graph have no common order: by arrival, a breach is reported {} s later if it is one for "
@@ -149,11 +148,11 @@ class Board:
 def graph_of(
     text: str, running: Session, host: str, *, enforce: bool = False, warn: Callable[[str], None] = lambda text: None
 ) -> Graph:
-    """``ros1``, ``ros1:http://host:11311``, ``ros2``, ``ros2:42`` (or ``dds``), ``rosbridge:ws://host:9090``. `warn`:
-    as `Ros1`. Raises Rejected."""
+    """``ros1``, ``ros1:http://host:11311``, ``ros2``, ``ros2:42`` (or ``dds``). `warn`: as `Ros1`. Raises
+    Rejected."""
     heard = [topic for topic in running.topics if not is_part(topic)]
     filters = filtered(monitor.setup for monitor in running.monitors) if enforce else frozenset[str]()
-    kind, _, address = text.partition(":")
+    kind = text.partition(":")[0]
     graph: Graph
     if kind == "ros1":
         graph = Ros1(master_of(text), heard, host, filters, warn)
@@ -165,10 +164,8 @@ def graph_of(
         except ValueError as error:
             raise Rejected(Diagnostic("MON303", str(error), hint="--live dds:0")) from None
         graph = Dds(domain, heard, running.kinds, running.known, host)
-    elif kind == "rosbridge" and address.startswith(("ws://", "wss://")):
-        graph = Rosbridge(address, heard)
     else:
-        hint = "ros1, ros1:http://host:11311, ros2, ros2:42, or rosbridge:ws://host:9090"
+        hint = "ros1, ros1:http://host:11311, ros2, or ros2:42"
         raise Rejected(Diagnostic("MON303", f"{text!r} is no graph that can be listened to", hint=hint))
     for topic in running.topics:
         if topic not in heard:

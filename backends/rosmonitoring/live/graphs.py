@@ -1,4 +1,4 @@
-"""The interface of a running graph to the code that judges it: `ros1`, `dds` and `rosbridge` implement it."""
+"""The interface of a running graph to the code that judges it: `ros1` and `dds` implement it."""
 
 from __future__ import annotations
 
