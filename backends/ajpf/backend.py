@@ -101,7 +101,7 @@ class AjpfBackend(Backend):
     def discharge(self, job: Job, folder: Path, limits: Limits) -> Report:
         from .run import settle
 
-        return settle(job, folder, limits, self.version)
+        return settle(job, limits, self.version)
 
 
 def _is_measured(sort: Sort) -> bool:

@@ -13,7 +13,6 @@ from avow.base.codec import document
 from avow.base.files import read_regular
 
 from . import psl
-from .ajpf_tool import jpf_file
 from .checker import Property
 from .instances import Instantiation
 from .java import CLASS, environment_class
@@ -28,8 +27,8 @@ _BUILDER = "gwendolen.GwendolenMASBuilder"
 def export_files(job: Job, setup: Setup, made: Instantiation) -> Mapping[str, str]:
     """Relative path → text."""
     name = setup.agent
-    runs = {f"jpf/{p.key}.jpf": jpf_file(f"{name}.ail", f"{name}.psl", p.key) for p in made.properties}
-    properties = {f"{name}.psl": psl_file(made.properties)}
+    runs = {f"jpf/{p.key}.jpf": _run(name, p.key) for p in made.properties}
+    properties = {f"{name}.psl": _psl_file(made.properties)}
     path = file_path(job, "program")
     assert path is not None  # `setup` was read from it
     program = {f"{name}.gwen": read_regular(path).decode("utf-8")}
@@ -37,16 +36,19 @@ def export_files(job: Job, setup: Setup, made: Instantiation) -> Mapping[str, st
 
 
 def system_files(setup: Setup, name: str, *, scripted: bool = False) -> dict[str, str]:
-    """The agents and their environment. The environment's Java class is the plan's, or the generated one."""
-    environment = setup.environment_class or CLASS
+    """The agents and their environment."""
     return {
         f"{name}.gwen": program_text(setup.programs),
-        f"{name}.ail": f"env = {environment}\nmas.file = {name}.gwen\nmas.builder = {_BUILDER}\n",
+        f"{name}.ail": f"env = {CLASS}\nmas.file = {name}.gwen\nmas.builder = {_BUILDER}\n",
         f"{CLASS}.java": environment_class(setup.environment, agents=len(setup.programs), scripted=scripted),
     }
 
 
-def psl_file(properties: Iterable[Property]) -> str:
+def _run(name: str, key: str) -> str:
+    return f"@using = mcapl\n\ntarget = ail.util.AJPF_w_AIL\ntarget.args = {name}.ail,{name}.psl,{key}\n"
+
+
+def _psl_file(properties: Iterable[Property]) -> str:
     """Lines ``key: formula``. Comments are ASCII and of one line, whatever the contract contains."""
     lines = []
     for p in properties:

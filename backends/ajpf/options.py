@@ -66,9 +66,7 @@ class Setup:
     instances: Mapping[str, tuple[int, ...]]
     extras: tuple[Extra, ...]
     semantics: Semantics
-    engine: str
     states: int
-    environment_class: str | None
 
 
 def read(job: Job) -> Setup:
@@ -102,8 +100,6 @@ class _OptionsReader:
         environment, environment_path = self.file("environment", read_environment)
         if programs is not None:
             self.agents(programs)
-        if self.options.get("engine") == "ajpf" and self.options.get("semantics", "mcapl") != "mcapl":
-            self.fault("AJPF119", "semantics: AJPF has its own, 'mcapl'", "semantics")
         instances = self.ranges(self.options.get("instances", {}), "instances")
         rows = self.rows(programs)
         extras = self.extras(programs, instances)
@@ -118,9 +114,7 @@ class _OptionsReader:
             instances,
             extras,
             Semantics(self.options.get("semantics", "mcapl")),
-            self.options.get("engine", "auto"),
             self.options.get("states", DEFAULT_STATES),
-            self.options.get("environment_class"),
         )
 
     def file(self, key: str, read_file: Any) -> tuple[Any, Path | None]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import random
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -17,12 +17,11 @@ from avow.base.process import ToolMissing
 from avow.formulas.lasso import Lasso
 from avow.isolation.outside import Outside
 
-from .ajpf_tool import BRIEF, AjpfResult, Answer, Installation, prepare
-from .asking import keep, key, recall
+from .ajpf_tool import BRIEF, Installation, prepare
 from .explore import Graph, System
 from .files import system_files
 from .interpreter import PRINT
-from .java import MARK, RUNS, SCRIPT, Script, runs_class
+from .java import MARK, RUNS, Script, runs_class
 from .options import Setup
 from .syntax import DeedKind
 from .terms import plain
@@ -97,31 +96,31 @@ def _told(system: System, state: Any, why: str) -> Moment:
     return Moment(why, tuple(sorted(texts)))
 
 
+@dataclass(frozen=True, slots=True)
+class Replayed:
+    """What AIL made of a run. `difference`: it does another one; `fault`: it could not be run."""
+
+    difference: str | None = None
+    fault: str = ""
+    log: str = ""
+
+
 def replay(
     installation: Installation, setup: Setup, runs: Sequence[Run], folder: Path, outside: Outside
-) -> tuple[Answer, ...]:
-    """For each run whether AIL does it (holds) or another one (violated, with the difference); an error if it cannot be
-    run. One Java process does all that are not cached (`asking`); `outside` records what it reads."""
-    files = system_files(setup, "agent", scripted=True)
+) -> tuple[Replayed, ...]:
+    """Each run, repeated by AIL: one Java process does all. `outside` records what it reads."""
     asked = [expected(graph, lasso) for graph, lasso in runs]
-    keys = [key({**files, SCRIPT: script.text()}, "replay", installation.mark()) for _, script in asked]
-    answers = [recall(each) for each in keys]
-    new = [at for at, answer in enumerate(answers) if answer is None]
-    if new:
-        fresh = _run(installation, files, [asked[at][1] for at in new], folder, outside)
-        for at, answer in zip(new, fresh, strict=True):
-            answers[at] = answer
-    return tuple(_judged(*each) for each in zip(answers, asked, keys, strict=True))
-
-
-def _judged(answer: Answer | None, asked: tuple[Sequence[Moment], Script], key: str) -> Answer:
-    assert answer is not None
-    if answer.said is AjpfResult.ERROR:
-        return answer
-    if (difference := _difference(asked[0], answer.log)) is not None:
-        return replace(answer, said=AjpfResult.VIOLATED, reason=difference)
-    keep(key, answer)  # any other result may be due to the machine, and is retried
-    return answer
+    files = system_files(setup, "agent", scripted=True)
+    try:
+        wrong, output = _run(installation, files, [script for _, script in asked], folder, outside)
+    except ToolMissing as error:
+        wrong, output = str(error), ""
+    if wrong is not None:
+        return tuple(Replayed(fault=wrong) for _ in asked)
+    logs = re.split(rf"^{MARK}run .*$", output, flags=re.MULTILINE)[1 : len(asked) + 1]
+    done = [Replayed(_difference(moments, log), log=log) for (moments, _), log in zip(asked, logs, strict=False)]
+    lost = Replayed(fault=f"Java ended before the run: {output.strip()[-200:]}")
+    return (*done, *[lost] * (len(asked) - len(logs)))
 
 
 def sampled(graph: Graph, runs: int) -> Iterator[Lasso]:
@@ -143,28 +142,18 @@ def sampled(graph: Graph, runs: int) -> Iterator[Lasso]:
 
 def _run(
     installation: Installation, files: Mapping[str, str], scripts: Sequence[Script], folder: Path, outside: Outside
-) -> tuple[Answer, ...]:
-    wrong, output = None, ""
-    try:
-        wrong = prepare(installation, folder, {**files, f"{RUNS}.java": runs_class()}, outside)
-        if wrong is None:
-            names = [f"{at}.txt" for at in range(len(scripts))]
-            for name, script in zip(names, scripts, strict=True):
-                (folder / name).write_text(script.text(), encoding="utf-8")
-            command = [installation.java, *BRIEF, "-cp", installation.class_path("."), RUNS, str(REPLAY_MILLISECONDS)]
-            env = {"AJPF_HOME": str(installation.home)}
-            seconds = REPLAY_START + len(scripts) * REPLAY_MILLISECONDS / 1000
-            done = outside.run([*command, *names], cwd=folder, seconds=seconds, env=env)
-            output = f"{done.stdout}\n{done.stderr}"
-    except ToolMissing as error:
-        wrong = str(error)
+) -> tuple[str | None, str]:
+    """Why the scripts cannot be run, and what AIL prints of them. Raises ToolMissing."""
+    wrong = prepare(installation, folder, {**files, f"{RUNS}.java": runs_class()}, outside)
     if wrong is not None:
-        return tuple(Answer(AjpfResult.ERROR, wrong, observed=outside.observed()) for _ in scripts)
-    logs = re.split(rf"^{MARK}run .*$", output, flags=re.MULTILINE)[1 : len(scripts) + 1]
-    seen = outside.observed()
-    done_runs = [Answer(AjpfResult.HOLDS, log=log, observed=seen) for log in logs]
-    lost = Answer(AjpfResult.ERROR, f"Java ended before the run: {output.strip()[-200:]}", observed=seen)
-    return (*done_runs, *(lost for _ in scripts[len(logs) :]))
+        return wrong, ""
+    names = [f"{at}.txt" for at in range(len(scripts))]
+    for name, script in zip(names, scripts, strict=True):
+        (folder / name).write_text(script.text(), encoding="utf-8")
+    command = [installation.java, *BRIEF, "-cp", installation.class_path("."), RUNS, str(REPLAY_MILLISECONDS)]
+    seconds = REPLAY_START + len(scripts) * REPLAY_MILLISECONDS / 1000
+    done = outside.run([*command, *names], cwd=folder, seconds=seconds, env={"AJPF_HOME": str(installation.home)})
+    return None, f"{done.stdout}\n{done.stderr}"
 
 
 def _difference(moments: Sequence[Moment], output: str) -> str | None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tempfile
 import time
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -18,52 +18,41 @@ from avow.isolation.observed import Observed, Seen
 from avow.isolation.outside import Outside
 
 from . import ajpf_tool
-from .ajpf_tool import AjpfResult, Installation
-from .asking import ask
+from .ajpf_tool import Installation
 from .beliefs import TooDeep
 from .checker import Checker, OutOfTime, Property, asks_for_percepts
 from .explore import explore
 from .instances import Instantiation, instances
 from .options import Setup, read
 from .replay import Run, replay, sampled
-from .settle import Frame, Settled, outcome
+from .settle import ENGINE, Frame, Settled, outcome
 from .society import system
 from .tuning import GRACE, SAMPLED_RUNS
 from .words import Wording, explain
 
-ENGINE = "Avow's own Gwendolen checker"
 
-_SAID = {
-    AjpfResult.HOLDS: Verdict.CHECKED,
-    AjpfResult.VIOLATED: Verdict.REFUTED,
-    AjpfResult.INCONCLUSIVE: Verdict.UNKNOWN,
-    AjpfResult.TIMEOUT: Verdict.UNKNOWN,
-    AjpfResult.ERROR: Verdict.ERROR,
-}
-
-
-def settle(job: Job, folder: Path, limits: Limits, version: str) -> Report:
+def settle(job: Job, limits: Limits, version: str) -> Report:
     """An outcome for each obligation. `version` is the backend's."""
     try:
         setup = read(job)
     except Rejected as error:
         why = f"the agent cannot be checked: {summarized(job, error.diagnostics)}"
         return Report.alike(job, Verdict.ERROR, why, ENGINE, version)
-    run = _Run(setup, instances(job, setup), folder, limits)
-    frame = run.frame()
+    run = _Run(setup, instances(job, setup), limits)
+    run.explore_all()
+    frame = Frame(setup, run.made, run.results, run.counterexamples, run.bound)
     claims = {claim.guarantee: claim for claim in frame.made.claims}
     outcomes = tuple(outcome(o, claims[o.name], frame) for o in job.obligations)
-    return Report(outcomes, frame.engine, run.version(version), run.command, run.logs, tuple(run.observed))
+    return Report(outcomes, ENGINE, version, (), run.logs, tuple(run.observed))
 
 
 class _Run:
     """The results so far."""
 
-    def __init__(self, setup: Setup, made: Instantiation, folder: Path, limits: Limits) -> None:
+    def __init__(self, setup: Setup, made: Instantiation, limits: Limits) -> None:
         self.setup = setup
         self.made = made
         self.wording = Wording(setup.rows, made.words, setup.instances)
-        self.folder = folder
         self.limits = limits
         self.deadline = time.monotonic() + limits.seconds
         self.results: dict[str, Settled] = {}
@@ -71,29 +60,14 @@ class _Run:
         self.bound: dict[str, Any] = {}
         self.checkers: dict[str, Checker] = {}
         """Property's key → the checker with the state space that it was checked on."""
-        self.engine = ENGINE
         self.logs: dict[str, str] = {}
-        self.command: tuple[str, ...] = ()
-        self.observed: dict[Observed, None] = {}
+        self.observed: list[Observed] = []
         self.ajpf = ajpf_tool.find() if setup.semantics == "mcapl" else None
-
-    def version(self, own: str) -> str:
-        if self.setup.engine == "ajpf":
-            return self.ajpf.version if self.ajpf else ""
-        return own
 
     def left(self) -> float:
         return max(0.0, self.deadline - time.monotonic())
 
-    def frame(self) -> Frame:
-        self.own()
-        if self.setup.engine == "ajpf":
-            self.ask_ajpf()
-        return Frame(self.setup, self.made, self.results, self.counterexamples, self.engine, self.bound)
-
-    # Our own engine
-
-    def own(self) -> None:
+    def explore_all(self) -> None:
         """Results for every property; if a bound was met, a violation within it still counts. Properties about percepts
         have a state space of their own (`interpreter.Agent`)."""
         self.bound |= {"states": 0, "transitions": 0, "exhaustive": True}
@@ -132,24 +106,20 @@ class _Run:
         unfinished = checker.graph.unfinished
         if result.holds and unfinished is not None:
             return Settled(Verdict.UNKNOWN, f"not refuted, but the state space is unfinished: {unfinished}")
-        refutes = (p.forbidden is None or result.answered) and not p.indecisive
         answer = Verdict.CHECKED if result.holds else Verdict.REFUTED
-        verdict, reason = self.judged(p, answer, refutes)
-        return Settled(verdict, reason, answer, result.vacuous, result.immediate, result.valid, refutes)
+        reason = "" if result.holds else self.doubt(p, result.answered)
+        verdict = Verdict.UNKNOWN if reason else answer
+        return Settled(verdict, reason, answer, result.vacuous, result.immediate, result.valid)
 
-    def judged(self, p: Property, verdict: Verdict, refutes: bool) -> tuple[Verdict, str]:
-        """The meaning of a property's answer for its guarantee. A forbidden formula may hold long after the trigger,
-        for another reason: that is a refutation only if it is the answer to the trigger (`Result.answered`)."""
-        if verdict is Verdict.REFUTED and p.indecisive:
-            return Verdict.UNKNOWN, p.indecisive
-        if verdict is not Verdict.REFUTED or refutes or p.forbidden is None:
-            return verdict, ""
-        banned = self.wording.say(p.forbidden)
-        reason = (
-            f"what is forbidden ({banned}) comes in some runs, and may have another reason than the trigger: "
-            "say when it must not come by a property of the plan that `forbids` it"
+    def doubt(self, p: Property, answered: bool) -> str:
+        """Why a run on which the property fails does not refute its guarantee, if so. A forbidden formula may hold long
+        after the trigger, for another reason: that refutes only if it is the answer to the trigger."""
+        if p.indecisive or p.forbidden is None or answered:
+            return p.indecisive
+        return (
+            f"what is forbidden ({self.wording.say(p.forbidden)}) comes in some runs, and may have another reason than "
+            "the trigger: say when it must not come by a property of the plan that `forbids` it"
         )
-        return Verdict.UNKNOWN, reason
 
     def explain(self) -> None:
         """A run for the first refuted property of each guarantee, and of each further property. If AJPF is installed,
@@ -160,7 +130,7 @@ class _Run:
             refuted = next((p for p in group if self.results[p.key].verdict is Verdict.REFUTED), None)
             if refuted is not None and (run := self.explained(refuted)) is not None:
                 runs.append((refuted.key, run))
-        if self.setup.engine in ("auto", "ajpf") and self.ajpf is not None and not self.setup.environment_class:
+        if self.ajpf is not None:
             runs += [("", run) for run in self.samples()]
             self.replay(self.ajpf, runs)
 
@@ -189,17 +159,18 @@ class _Run:
         outside = Outside((ajpf.tool,))
         with tempfile.TemporaryDirectory(prefix="avow-ail-") as folder:
             answers = replay(ajpf, self.setup, [run for _, run in runs], Path(folder), outside)
+        self.observed = list(outside.observed())
         agreed = 0
         for (key, _), answer in zip(runs, answers, strict=True):
-            if answer.said is AjpfResult.ERROR:
-                self.unanswered(answer.observed)
-                self.bound["replay"] = f"not replayed by {name}: {answer.reason}"
+            if answer.fault:
+                # nothing of ours depends on it, so that what cannot be recorded is left out; it may succeed later
+                self.observed = [o for o in self.observed if o.kind is not Seen.OUTSIDE]
+                self.bound["replay"] = f"not replayed by {name}: {answer.fault}"
                 return
-            self.observed.update(dict.fromkeys(answer.observed))
             if key:
                 self.logs[f"{key}.replay.txt"] = answer.log
-            if answer.said is AjpfResult.VIOLATED:
-                reason = f"contradictory: {name} does not do {_of(key)}: {answer.reason}"
+            if answer.difference is not None:
+                reason = f"contradictory: {name} does not do {_of(key)}: {answer.difference}"
                 self.results = {
                     each: replace(r, verdict=Verdict.ERROR, reason=reason) for each, r in self.results.items()
                 }
@@ -210,40 +181,6 @@ class _Run:
                 result = self.results[key]
                 self.results[key] = replace(result, opinions={**result.opinions, name: "does the same run"})
         self.bound["replay"] = f"{name} does {agreed} runs as the checker does"
-
-    # Others
-
-    def unanswered(self, observed: Iterable[Observed]) -> None:
-        """Record what was read for a second opinion that failed: it may succeed once that changes. What cannot be
-        recorded is left out, as none of our answers depends on it."""
-        self.observed.update(dict.fromkeys(o for o in observed if o.kind is not Seen.OUTSIDE))
-
-    def ask_ajpf(self) -> None:
-        """AJPF's answers instead of ours. Vacuity and runs in words stay our own engine's."""
-        self.engine = "AJPF"
-        if self.ajpf is None:
-            reason = f"AJPF is not here: {ajpf_tool.INSTALL}"
-            self.results = {p.key: Settled(Verdict.NOT_RUN, reason) for p in self.made.properties}
-            self.counterexamples = {}
-            return
-        answers = ask(self.ajpf, self.setup, self.made.properties, self.left(), self.limits.megabytes)
-        named = {answer.framework for answer in answers.values() if answer.framework}
-        self.bound["ajpf"] = f"{self.ajpf.version}, {' and '.join(sorted(named)) or 'which did not name itself'}"
-        self.observed.update(dict.fromkeys(o for answer in answers.values() for o in answer.observed))
-        kept = sum(answer.kept for answer in answers.values())
-        if kept:
-            self.bound["ajpf"] += f"; {kept} of {len(answers)} answers kept of an earlier run with the same files"
-        for p in self.made.properties:
-            answer = answers[p.key]
-            if answer.log:
-                self.logs[f"{p.key}.ajpf.txt"] = answer.log
-            if answer.said is AjpfResult.VIOLATED and self.setup.environment.fair:
-                reason = "AJPF knows no fairness: a run on which it fails may be unfair"
-                answer = replace(answer, said=AjpfResult.INCONCLUSIVE, reason=reason)
-            own = self.results[p.key]
-            verdict, reason = self.judged(p, _SAID[answer.said], own.refutes and own.answer is not None)
-            opinions = {} if own.answer is None else {ENGINE: str(own.answer)}
-            self.results[p.key] = replace(own, verdict=verdict, reason=reason or answer.reason, opinions=opinions)
 
 
 def _of(key: str) -> str:

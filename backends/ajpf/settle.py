@@ -18,6 +18,8 @@ from .tautology import is_valid
 from .terms import Struct
 from .words import together
 
+ENGINE = "Avow's own Gwendolen checker"
+
 
 @dataclass(frozen=True, slots=True)
 class Settled:
@@ -31,8 +33,6 @@ class Settled:
     immediate: bool = False
     valid: bool = False
     """True for every agent, through the table alone."""
-    refutes: bool = True
-    """Whether a run on which the property fails refutes the guarantee; otherwise the verdict is unknown."""
     opinions: Mapping[str, str] = field(default_factory=dict)
     """Other engines' answers: ``{"AIL (…)": "does the same run"}``."""
 
@@ -46,7 +46,6 @@ class Frame:
     results: Mapping[str, Settled]
     counterexamples: Mapping[str, Counterexample]
     """For some of the refuted properties, by key."""
-    engine: str
     bound: Mapping[str, object]
 
 
@@ -61,7 +60,7 @@ def outcome(obligation: Obligation, claim: Claim, frame: Frame) -> Outcome:
     )
     limits = (*frame.setup.environment.describe(), *_no_messages(frame.setup.programs))
     late = (bound("deadline", claim.hypothesis),) if claim.hypothesis else ()
-    details: dict[str, object] = {"engine": frame.engine, "percept_semantics": str(frame.setup.semantics)}
+    details: dict[str, object] = {"engine": ENGINE, "percept_semantics": str(frame.setup.semantics)}
     if claim.not_covered is not None:
         summary = f"not covered: {claim.not_covered}"
         return Outcome(obligation.id, Verdict.UNKNOWN, summary, details=details, link=Link.MAPPED)
@@ -176,7 +175,7 @@ def _summary(
             parts.append(f"'{extra.name}' (listed, not counted) fails{_which(failing)}")
     if claim.indices:
         parts.append(", ".join(claim.indices))
-    parts.append(f"{frame.engine}, {frame.setup.semantics} percepts")
+    parts.append(f"{ENGINE}, {frame.setup.semantics} percepts")
     states = frame.bound.get("states")
     if isinstance(states, int):
         parts[-1] += f", {states} states"

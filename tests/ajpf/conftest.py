@@ -68,7 +68,7 @@ def rover(tmp_path: Path) -> MakeJob:
             "nodes": {"agent": {"criticality": "high", "methods": yaml.safe_load((FIXTURES / method).read_text())}},
         }
         (folder / "plan.yaml").write_text(yaml.safe_dump(plan, sort_keys=False))
-        return _job(folder, "agent", {"engine": "builtin", **(options or {})})
+        return _job(folder, "agent", options or {})
 
     return make
 

@@ -188,8 +188,6 @@ BAD_OPTIONS = {
     "no such guarantee": ({"properties": {"p": {"psl": "T", "guarantee": "x"}}}, "no guarantee 'x'"),
     "empty range": ({"instances": {"f": "3..1"}}, "empty"),
     "no numbers": ({"instances": {"f": ["one"]}}, "natural numbers"),
-    "class with a line": ({"environment_class": "lift.Env\nmas.file = x"}, "has not the right form"),
-    "AJPF with other percepts": ({"engine": "ajpf", "semantics": "edge"}, "semantics"),
 }
 
 

@@ -61,7 +61,6 @@ def random_job(folder: Path, rng: random.Random) -> Job:
         "program": "ag.gwen",
         "environment": "env.yaml",
         "agent": "ag",
-        "engine": "builtin",
         "states": STATES,
         "predicates": TABLE,
         "semantics": rng.choice(("mcapl", "edge")),

@@ -175,7 +175,7 @@ def test_a_system_is_checked_as_a_nodes_method(lift, tmp_path, monkeypatch):
     job = lift()
     path = job.root / job.options["program"]
     text = path.read_text() + agent("log", "+.received(:tell, B) : { True } <- +B;")
-    job = lift({"engine": "builtin", "properties": {"never": "[] (~B(log, told))"}}, {path.name: text})
+    job = lift({"properties": {"never": "[] (~B(log, told))"}}, {path.name: text})
     assert not [d for d in BACKEND.check(job) if d.is_error]
     report = BACKEND.discharge(job, tmp_path, Limits(seconds=120))
     assert {o.verdict for o in report.outcomes} <= {Verdict.CHECKED, Verdict.REFUTED, Verdict.UNKNOWN}

@@ -15,7 +15,6 @@ from typing import Any
 import pytest
 from core.test_codec import Outer
 
-from avow.backends.ajpf.ajpf_tool import Answer
 from avow.backends.fuzz import runner
 from avow.backends.hypothesis import exchange
 from avow.base.codec import Foreign, Unreadable, canonical, from_json, from_text, to_json
@@ -41,7 +40,7 @@ KINDS: list[Any] = [
     runner.Answered,
     runner.Shown,
 ]
-KINDS += [Answer, _Wanted, Line, _Word, Certificate, Checked, _Settled, Stamp, Rendering, _Overview, Listing]
+KINDS += [_Wanted, Line, _Word, Certificate, Checked, _Settled, Stamp, Rendering, _Overview, Listing]
 KINDS += [_Known, _Digest, _Report, _Export, _Envelope, Outer]
 
 
