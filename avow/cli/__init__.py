@@ -25,7 +25,6 @@ from avow import __version__  # noqa: E402
 gc.set_threshold(COLLECTED_IN_WORKS)  # most objects of a command stay alive, so collections find little
 
 COMMANDS = {
-    "agent": "run an agent program step by step, on percepts that you give",
     "audit": "recompute every digest that the ledger records",
     "campaign": "make the runs of a simulator as evidence, or search for a failing scenario",
     "check": "report errors and warnings of .rcl files and plans, in milliseconds",
@@ -58,7 +57,6 @@ COMMANDS = {
 """Name → one line of help. The module of that name in this package has the click command `command`."""
 
 _OF_BACKENDS = {
-    "agent": "avow.backends.ajpf.command",
     "campaign": "avow.backends.experiment.command",
     "drive": "avow.backends.rosmonitoring.driving",
     "monitor": "avow.backends.rosmonitoring.command",

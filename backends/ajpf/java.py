@@ -20,8 +20,6 @@ from .environment import Choice, Environment
 from .terms import CONS, NIL, Struct, Term, Var
 
 CLASS = "AvowEnvironment"
-SCRIPT = "script.txt"
-"""The file that a scripted environment reads its choices from."""
 MARK = "avow: "
 """The prefix of the output lines in which a scripted environment reports events."""
 

@@ -5,11 +5,9 @@ from __future__ import annotations
 import time
 
 import pytest
-from click.testing import CliRunner
 
 from avow.backend_kit.protocol import Limits
 from avow.backends.ajpf import BACKEND
-from avow.backends.ajpf.command import command
 from avow.backends.ajpf.environment import read_environment
 from avow.backends.ajpf.explore import explore
 from avow.backends.ajpf.interpreter import Semantics
@@ -114,9 +112,10 @@ def test_a_rule_that_asks_for_too_much_ends_the_search(tmp_path):
     """Six of forty beliefs, in every way: 4,096,000,000 of them."""
     beliefs = "\n".join(f"n({k})" for k in range(40))
     rule = "big :- n(A), n(B), n(C), n(D), n(E), n(F), never;"
-    (tmp_path / "a.gwen").write_text(
+    text = (
         f"GWENDOLEN\n:name: ag\n:Initial Beliefs:\n{beliefs}\n:Reasoning Rules:\n{rule}\n:Initial Goals:\ng [perform]\n"
         ":Plans:\n+!g [perform] : { B big } <- act;\n"
     )
-    told = CliRunner().invoke(command, ["run", str(tmp_path / "a.gwen")])
-    assert "ask for too much" in told.output
+    (tmp_path / "e.yaml").write_text("percepts: {x: [nothing]}\n")
+    found = explore(system(parse_system(text, "a.gwen"), read_environment(tmp_path / "e.yaml"), Semantics.MCAPL))
+    assert "ask for too much" in str(found.unfinished)

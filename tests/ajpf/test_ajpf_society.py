@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-import json
-
 import pytest
-from click.testing import CliRunner
 from small_societies import society
 
 from avow.backend_kit.protocol import Limits
 from avow.backends.ajpf import BACKEND
 from avow.backends.ajpf.checker import Checker, Property, asks_for_percepts
-from avow.backends.ajpf.command import command
 from avow.backends.ajpf.environment import read_environment
 from avow.backends.ajpf.explore import explore
 from avow.backends.ajpf.files import program_text
@@ -158,16 +154,6 @@ def test_programs_are_printed_and_read_again():
     for seed in range(20):
         once = program_text(parse_system(society(seed).program, "s.gwen"))
         assert program_text(parse_system(once, "s.gwen")) == once
-
-
-def test_a_run_is_told_agent_by_agent(tmp_path):
-    two = agent("two", "+.received(:tell, B) : { True } <- +B;")
-    (tmp_path / "s.gwen").write_text("GWENDOLEN\n" + GREETER + two)
-    told = CliRunner().invoke(command, ["run", str(tmp_path / "s.gwen")])
-    assert "one: does .send(two, :tell, hello)" in told.output
-    assert "two: answers +.received(:tell, hello)" in told.output
-    steps = CliRunner().invoke(command, ["run", str(tmp_path / "s.gwen"), "--json"]).output.splitlines()
-    assert {json.loads(step)["agent"] for step in steps[:-1]} == {"one", "two"}
 
 
 def test_a_system_is_checked_as_a_nodes_method(lift, tmp_path, monkeypatch):

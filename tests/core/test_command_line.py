@@ -22,7 +22,6 @@ SERVERS = {"lsp", "worker"}
 NO_QUESTIONS = {
     *SERVERS,
     *(
-        "agent run",
         "audit",
         "campaign",
         "check",

@@ -103,8 +103,6 @@ INSTEAD = {
     'avow sign --report SYSTEM --as "A. Person, safety engineer" --until 2027-11-22 [--key FILE]': f"{SIGNED}"
     f" && {KEYED} && {SIGNED} --key my.key",
     "avow verify --key FILE": f"{KEYED} && avow verify --key my.key",
-    "avow agent run agent.gwen --environment agent_environment.yaml --seed 3": "cd contracts/remote_inspection/models"
-    " && avow agent run agent.gwen --environment agent_environment.yaml --seed 3",
     "avow check FILE.rcl …": "avow check contracts/thermostat/system.rcl",
     "avow review sign": f"{KEYED} && {STAMPED} && avow review sign thermostat thermometer --key my.key",
     "avow audit --new-key FILE": KEYED,
