@@ -5,7 +5,6 @@ Imports stay light: listing the backends does not load the code that writes and 
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -152,7 +151,7 @@ class DafnyBackend(Backend):
         scanned = _scan(text, generated)
         outside = Outside((tool,))
         try:
-            settled = settle(job.node, generated, scanned, path.name, limits, outside)
+            settled = settle(generated, scanned, path.name, limits, outside)
         except (process.ToolMissing, OSError) as error:
             return Report.unanswered(job, Verdict.ERROR, f"dafny could not be run: {error}", "dafny", version)
         uncovered = dict(generated.uncovered)
@@ -182,7 +181,7 @@ def _outcome(obligation: str, settled: Settled) -> Outcome:
 def _implementation(job: Job) -> tuple[Path, str]:
     """The hand-written file. Raises Rejected."""
     name, place = job.options.get("implementation", ""), job.method.options.at("implementation")
-    hint = f"for a skeleton to start from: python -m avow.backends.dafny {_shown(job.root)} {job.node.name}"
+    hint = f"for a skeleton to start from: avow translate --to dafny {job.system.name} --node {job.node.name} -o made"
     path = existing_file(job, "implementation", name, wrong="DFY101", absent="DFY102", hint=hint)
     try:
         data = read_regular(path)
@@ -193,14 +192,6 @@ def _implementation(job: Job) -> tuple[Path, str]:
         return path, data.decode("utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
         raise Rejected(Diagnostic("DFY102", f"'{name}' cannot be read: {error}", place)) from None
-
-
-def _shown(folder: Path) -> str:
-    """The folder as one would type it in the current directory."""
-    try:
-        return shlex.quote(str(folder.resolve().relative_to(Path.cwd())) or ".")
-    except (OSError, ValueError):
-        return shlex.quote(str(folder))
 
 
 def _generate(job: Job) -> Generated:

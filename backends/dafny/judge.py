@@ -12,31 +12,22 @@ it.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import field, replace
-from fractions import Fraction
 
 from avow.backend_kit.protocol import Limits
 from avow.base.plain import ALLOWS_MORE
 from avow.base.records import dataclass
-from avow.base.tuning.effort import JUDGE_EFFORT
 from avow.base.verdict import Verdict
 from avow.evidence.record import OUTPUT_FOR_EVERY_INPUT, SOLVER
-from avow.formulas.formula import free_variables
-from avow.formulas.values import Value, show
 from avow.isolation.outside import Outside
-from avow.language.contract import Node
-from avow.language.sorts import BoolSort, IntegerSort, NaturalSort, RealSort
-from avow.language.subterms import histories
-from avow.language.terms import Variable
 
 from .answer import Member
 from .history import FIRST
 from .modules import ANYWAY, BY_ENV, CALL, ENV_ALWAYS, EXCLUDED_FILE, PROBE_FILE, Generated, without_env_always
-from .printer import Names, Vocabulary
 from .runner import Audit, Run, audit, verify
 from .scanner import Scan, resolved_environment
-from .tuning import PROBLEMS_SHOWN, VALUES_SHOWN
+from .tuning import PROBLEMS_SHOWN
 
 _FINISHED = re.compile(r"Dafny program verifier finished with (\d+) verified, (\d+) errors?(.*)")
 
@@ -58,10 +49,8 @@ class Judgement:
     logs: Mapping[str, str]
 
 
-def settle(
-    node: Node, generated: Generated, scanned: Scan, shown_name: str, limits: Limits, outside: Outside
-) -> Judgement:
-    """Run Dafny and judge each guarantee of the node. `shown_name` is the implementation's name in messages.
+def settle(generated: Generated, scanned: Scan, shown_name: str, limits: Limits, outside: Outside) -> Judgement:
+    """Run Dafny and judge each guarantee. `shown_name` is the implementation's name in messages.
 
     Raises ToolMissing, OSError.
     """
@@ -105,8 +94,7 @@ def settle(
         answer = verify(_asked_of_env(files, generated), limits, outside)
         logs["excluded.log"] = answer.output
         unasked, about_nothing = _about_nothing(answer, generated)
-    tried = [dict(c) for c in candidates(run.model, node)] if any(unproved.values()) else []
-    verdicts = {name: _verdict(unproved[name], taken, environment, scanned, generated, tried) for name in guarantees}
+    verdicts = {name: _verdict(unproved[name], taken, environment, scanned, generated) for name in guarantees}
     for name in unasked & {n for n, settled in verdicts.items() if settled.verdict is Verdict.PROVED}:
         text = f"proved, but Dafny does not answer whether Env ({environment}) excludes its condition"
         verdicts[name] = replace(verdicts[name], verdict=Verdict.UNKNOWN, summary=text)
@@ -122,17 +110,12 @@ def _verdict(
     environment: str | None,
     scanned: Scan,
     generated: Generated,
-    tried: list[dict[str, str]],
 ) -> Settled:
     members = [name for _, name in scanned.members]
     details: dict[str, object] = {SOLVER: "z3", "module": generated.impl_module, "members": members}
     if unproved:
         details["not proved"] = list(unproved)
-        if tried:
-            details["candidates"] = tried  # not excluded by the prover; the implementation was not run on them
-        where = ", ".join(f"{name} = {value}" for name, value in tried[0].items()) if tried else ""
-        doubt = f"; the prover could not rule it out at {where}" if where else ""
-        return Settled(Verdict.UNKNOWN, f"not proved: {_few(unproved)}{doubt}", taken, details)
+        return Settled(Verdict.UNKNOWN, f"not proved: {_few(unproved)}", taken, details)
     if taken:
         return Settled(
             Verdict.UNKNOWN, f"proved only if what it takes for granted holds: {_few(taken)}", taken, details
@@ -291,68 +274,3 @@ def _name(file: str, generated: Generated, shown_name: str) -> str:
 def _few(items: tuple[str, ...] | list[str]) -> str:
     more = f"; and {len(items) - PROBLEMS_SHOWN} more" if len(items) > PROBLEMS_SHOWN else ""
     return "; ".join(items[:PROBLEMS_SHOWN]) + more
-
-
-# -- inputs at which a proof failed ------------------------------------------------------------------------------------
-
-
-_LINE = re.compile(r"(?P<name>[\w'?]+)#\d+(?:@@\d+)? -> (?P<value>\(- \d+(?:\.\d+)?\)|-?\d+(?:\.\d+)?|true|false)\s*")
-
-
-def candidates(model: str, node: Node) -> tuple[Mapping[str, str], ...]:
-    """From the prover's model up to three candidates, never counterexamples, as ``{"in.r": "125"}``; none if the node
-    has only inputs of other sorts. The prover gives up with a model that it could not exclude, which may not be a
-    possible behaviour. Only its values for inputs of simple sorts are read, and only if the contract's assumptions,
-    replayed in Z3, do not forbid them."""
-    found: list[Mapping[str, str]] = []
-    for text in _models(model):
-        values = _values(text, node)
-        shown = {variable.qualified: show(value) for variable, value in values.items()}
-        if shown and shown not in found and _allowed(node, values):
-            found.append(shown)
-        if len(found) == VALUES_SHOWN:
-            break
-    return tuple(found)
-
-
-def _models(text: str) -> Iterator[str]:
-    for part in text.split("*** MODEL")[1:]:
-        yield part.split("*** END_MODEL")[0]
-
-
-def _values(model: str, node: Node) -> dict[Variable, Value]:
-    words = Vocabulary(Names(), Names(), ())
-    ports = {words.local(port.variable): port.variable for port in node.inputs}
-    values: dict[Variable, Value] = {}
-    for line in model.splitlines():
-        match = _LINE.fullmatch(line)
-        variable = ports.get(match["name"]) if match else None
-        if match is None or variable is None or variable in values:
-            continue
-        value = _value(match["value"], variable)
-        if value is not None:
-            values[variable] = value
-    return values
-
-
-def _value(text: str, variable: Variable) -> Value | None:
-    if text in ("true", "false"):
-        return text == "true" if isinstance(variable.sort, BoolSort) else None
-    number = Fraction(text.strip("()").replace("- ", "-"))
-    match variable.sort:
-        case RealSort():
-            return number
-        case IntegerSort() | NaturalSort() if number.denominator == 1:
-            return int(number)
-        case _:  # not a number of this sort
-            return None
-
-
-def _allowed(node: Node, values: Mapping[Variable, Value]) -> bool:
-    """Whether no assumption about these inputs alone is known to be false for them."""
-    from avow.solving.replay import replay  # Z3 is slow to import
-
-    spoken = [
-        a.formula for a in node.assumptions if free_variables(a.formula) <= values.keys() and not histories(a.formula)
-    ]
-    return not spoken or replay(spoken, values, effort=JUDGE_EFFORT) is not False

@@ -111,9 +111,9 @@ class Generated:
     remembers: bool = False
     """Whether the contract refers to other steps, so that there is a history."""
 
-    def skeleton(self, folder: str = "") -> str:
-        """A first implementation. `folder`: the folder of the generated files, relative to its own (``../x/``)."""
-        return f'include "{folder}{self.spec_file}"\n{self.outline}'
+    def skeleton(self) -> str:
+        """A first implementation, beside the generated files."""
+        return f'include "{self.spec_file}"\n{self.outline}'
 
     @property
     def lemmas(self) -> tuple[str, ...]:

@@ -20,11 +20,9 @@ from avow.isolation.outside import Outside
 from . import modern
 from .answer import Complaint, Member, complaints, counted, quiet, read_members
 from .dafny_tool import dafny, has_commands
-from .tuning import MODEL_CHARACTERS
 
 _ANSWER = "answer.xml"
 _RESOLVED = "resolved.txt"
-_MODEL = "model.txt"
 _FINISHED = re.compile(r"Dafny program verifier finished with \d+ verified, \d+ errors?")
 
 
@@ -38,8 +36,6 @@ class Run:
     complaints: tuple[Complaint, ...]
     counted: int | None
     output: str
-    model: str
-    """The prover's models for unproved conditions, as Boogie prints them."""
     resolved: str | None
     """The program after resolution and refinement, as Dafny prints it; None if this version has no such option."""
 
@@ -61,7 +57,7 @@ def verify(files: Mapping[str, str], limits: Limits, outside: Outside) -> Run:
     each = max(1, min(30, int(limits.seconds / 2)))
     if not has_commands(dafny().version):
         flags = ("/nologo", "/compile:0", f"/timeLimit:{each}", "/errorLimit:20")
-        answers = (f"/xml:{_ANSWER}", f"/mv:{_MODEL}", f"/rprint:{_RESOLVED}")
+        answers = (f"/xml:{_ANSWER}", f"/rprint:{_RESOLVED}")
         done = _run((*flags, *answers), files, limits, outside)
         members = read_members(done.answers[_ANSWER]) if done.answers[_ANSWER] else None
         return _answer(done, members, done.answers[_RESOLVED])
@@ -96,8 +92,7 @@ class _Done:
 
 
 def _answer(done: _Done, members: tuple[Member, ...] | None, resolved: str | None = None) -> Run:
-    complained, model = complaints(done.output), done.answers[_MODEL][:MODEL_CHARACTERS]
-    return Run(done.command, done.code, members, complained, counted(done.output), done.output, model, resolved)
+    return Run(done.command, done.code, members, complaints(done.output), counted(done.output), done.output, resolved)
 
 
 def _run(first: Sequence[str], files: Mapping[str, str], limits: Limits, outside: Outside) -> _Done:
@@ -116,5 +111,5 @@ def _run(first: Sequence[str], files: Mapping[str, str], limits: Limits, outside
         for file, text in files.items():
             (folder / file).write_text(text, encoding="utf-8")
         done = outside.run(command, cwd=folder, seconds=limits.seconds, megabytes=megabytes, env=env)
-        answers = {each: text_or_nothing(folder / each) for each in (_ANSWER, _MODEL, _RESOLVED, modern.LOG)}
+        answers = {each: text_or_nothing(folder / each) for each in (_ANSWER, _RESOLVED, modern.LOG)}
     return _Done(command, done.code, quiet(done.stdout + done.stderr), answers)

@@ -10,11 +10,10 @@ from typing import Any
 import pytest
 from helpers import some
 
-from avow.backend_kit.given import job_for as job_for_plan
 from avow.backend_kit.protocol import Backend, Job, Limits
 from avow.backends.dafny import BACKEND
-from avow.backends.dafny.__main__ import main
 from avow.base.verdict import Link, Outcome, Verdict
+from avow.system.load import load_system
 
 CONTRACTS = Path(__file__).resolve().parents[2] / "contracts"
 MakeJob = Callable[..., Job]
@@ -72,25 +71,12 @@ def test_the_papers_listing_is_not_accepted(make_job: MakeJob) -> None:
 
 @pytest.mark.needs_dafny
 @pytest.mark.slow
-def test_dafny_opens_a_skeleton_where_it_is_written(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Its include resolves once the workspace's files are exported."""
-    source, place = CONTRACTS / "remote_inspection", tmp_path / "contracts" / "lamp"
-    (place / "models" / "more").mkdir(parents=True)
-    (tmp_path / "dodo.py").write_text("")
-    (place / "system.rcl").write_text((source / "system.rcl").read_text())
-    (place / "plan.yaml").write_text(
-        "system: lamp\ncontract: system.rcl\nnodes:\n  radiationSensor:\n    methods:\n"
-        "      - dafny: {id: by-hand, implementation: models/more/sensor.dfy}\n"
-    )
-    assert main([str(place), "radiationSensor"]) == 0
-    job = job_for_plan(place, "radiationSensor", "dafny", None, wrong="DFY101", hint="")
-    folder = tmp_path / "artifacts/lamp/radiationSensor/by-hand"
-    folder.mkdir(parents=True)
-    for name, text in BACKEND.export(job).items():
-        (folder / name).write_text(text)
-    written = place / "models/more/sensor.dfy"
-    assert str(written) in capsys.readouterr().out
-    done = subprocess.run(["dafny", "/compile:0", "/noVerify", written], capture_output=True, text=True, check=False)
+def test_dafny_opens_a_skeleton(tmp_path: Path) -> None:
+    system = load_system(CONTRACTS / "remote_inspection")
+    for name, text in BACKEND.translate("dafny", system, system.contract.node("radiationSensor")).files.items():
+        (tmp_path / name).write_text(text)
+    skeleton = tmp_path / "radiationSensor_impl.dfy"
+    done = subprocess.run(["dafny", "/compile:0", "/noVerify", skeleton], capture_output=True, text=True, check=False)
     assert (done.returncode, "Error" in done.stdout) == (0, False), done.stdout
 
 

@@ -45,7 +45,7 @@ def test_each_situation_has_a_name_of_its_own_and_no_answer_is_no_good_answer() 
     assert made.conditions.count("e") > 1
     named = re.findall(r"predicate (?:method )?(\w+)", made.situations)
     assert len(named) == len(set(named)) > 1
-    rejected = Run((), 2, (), (), None, "duplicate", "", None)
+    rejected = Run((), 2, (), (), None, "duplicate", None)
     assert _about_nothing(rejected, made) == ({"e"}, frozenset())
 
 

@@ -156,9 +156,6 @@ def test_only_the_broken_guarantee_is_unproved(make_job: MakeJob, tmp_path: Path
     outcomes = settle(make_job, tmp_path, WRONG)
     assert outcomes["high"].verdict is Verdict.UNKNOWN
     assert "postcondition" in outcomes["high"].summary
-    (candidate,) = outcomes["high"].details["candidates"]  # type: ignore[misc]
-    assert float(candidate["in.r"]) >= 10
-    assert f"could not rule it out at in.r = {candidate['in.r']}" in outcomes["high"].summary
     assert outcomes["low"].verdict is Verdict.PROVED
     assert outcomes["count"].verdict is Verdict.PROVED
 

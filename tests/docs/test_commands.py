@@ -115,9 +115,6 @@ INSTEAD = {
     f" --to rml {ROOT}/contracts/remote_inspection_published --node agent",
     "avow translate --to …": "avow translate --to unicode thermostat",
     "python -m avow": "python -m avow --version",
-    "python -m avow.backends.dafny contracts/SYSTEM NODE": "sed -i"
-    " 's#- hoare: {program: models/thermostat.imp}#- dafny: {implementation: models/t.dfy}#' contracts/*/plan.yaml"
-    " && python -m avow.backends.dafny contracts/thermostat thermostat",
 }
 """Where filling in is not enough."""
 

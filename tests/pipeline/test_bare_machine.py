@@ -60,8 +60,9 @@ def test_what_a_missing_tool_leaves_open_is_visible_and_named(path: Path, tmp_pa
     source = "    source: {cpp: models/thermostat_avow.hpp}\n    methods:\n"
     more = "      - fuzz: {}\n      - dafny: {implementation: models/thermostat_impl.dfy}\n"
     edit(plan, (f"    methods:\n{METHODS}", f"{source}{METHODS}{more}"), ("policy: default\n", ACCEPTS))
-    skeleton = _run(robot, path, "avow.backends.dafny", "contracts/thermostat", "thermostat")
+    skeleton = _run(robot, path, "avow", "translate", "--to", "dafny", "thermostat", "-o", "made")
     assert skeleton.returncode == 0, skeleton.stderr
+    (robot / "made" / "thermostat" / "thermostat_impl.dfy").rename(system / "models" / "thermostat_impl.dfy")
 
     done = _run(robot, path, "doit", "verify")
     assert done.returncode == 0, done.stdout + done.stderr
