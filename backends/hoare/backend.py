@@ -30,10 +30,10 @@ from avow.solving.translation import Unsupported, new_session
 
 from .memory import knowing, remembered
 from .outline import one_line, outline
-from .program import While, has_loops, statements
+from .program import While, statements
 from .triples import Triple
-from .tuning import BRIEFLY_SECONDS, ENDLESS_EFFORT
-from .witness import Breach, breach, endless_run
+from .tuning import BRIEFLY_SECONDS
+from .witness import Breach, breach
 from .work import Work, left_unassigned, load, other_numbers, run_conditions
 from .wp import Condition, TooLarge, conditions
 
@@ -253,13 +253,13 @@ def _obligation(
 
 def _every_run(triple: Triple, work: Work, deadline: float) -> Settled:
     """Whether the program runs to its end on every input that is allowed. Where a loop has no variant, or one that is
-    not shown to fall, an input on which it never ends is looked for: that is none to be content with either."""
+    not shown to fall, it is run on some: one on which it comes back to the same state is refuted."""
     program = work.checked.program
     wanted = run_conditions(triple, program)
     failed = [c for c in wanted if not _holds(c, work.settler, deadline)]
-    shown = breach(triple, program, failed, max(1000, _left(deadline))) if failed and not work.steps else None
-    if shown is None and not work.steps and (_termination(work) or (failed and has_loops(program))):
-        shown = endless_run(triple, program, max(1000, min(_left(deadline), ENDLESS_EFFORT)))
+    shown = None
+    if not work.steps and (failed or _termination(work)):
+        shown = breach(triple, program, failed, max(1000, _left(deadline)))
     if shown is not None:
         return Settled(triple, Verdict.REFUTED, f"{shown.why}: on this input there is no output", shown)
     if failed:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Mapping
 from dataclasses import field
 
@@ -15,7 +14,7 @@ from avow.language.terms import Term
 from avow.solving.limits import spend
 
 from .program import Assign, Block, If, Match, Skip, Statement, Update, While
-from .tuning import LOOP_STATES, RUN_STEPS, STATEMENT_STEPS
+from .tuning import RUN_STEPS, STATEMENT_STEPS
 from .wp import defined
 
 _UNDEFINED = "a division by zero, an element that the sequence does not have, or a negative number for a natural one,"
@@ -25,13 +24,7 @@ State = dict[str, Value]
 
 
 class NoEnd(Exception):  # noqa: N818 - it names a state
-    """The program has not ended within `RUN_STEPS`. `loop` is the innermost loop that it was in, and `heads` are the
-    last states in which its test was found true."""
-
-    def __init__(self) -> None:
-        super().__init__("no end")
-        self.loop: While | None = None
-        self.heads: tuple[State, ...] = ()
+    """The program has not ended within `RUN_STEPS`."""
 
 
 class Endless(Exception):  # noqa: N818 - it names a state
@@ -123,23 +116,15 @@ class Machine:
         """Brent's search for a circle: the state is held against one that is taken anew after 1, 2, 4… rounds. What a
         round does depends on nothing but the state, so that one met twice is met for ever."""
         held, rounds, power = dict(state), 0, 1
-        heads: deque[State] = deque(maxlen=LOOP_STATES)
-        try:
-            while self._compute(loop.condition, state, loop.span):
-                heads.append(dict(state))
-                self.steps += 1
-                self._ended()
-                self._block(loop.body, state)
-                if state == held:
-                    self.endless += 1
-                    raise Endless(loop)
-                rounds += 1
-                if rounds == power:
-                    held, rounds, power = dict(state), 0, 2 * power
-        except NoEnd as no_end:
-            if no_end.loop is None:
-                no_end.loop, no_end.heads = loop, tuple(heads)
-            raise
+        while self._compute(loop.condition, state, loop.span):
+            self.steps += 1
+            self._ended()
+            self._block(loop.body, state)
+            if state == held:
+                raise Endless(loop)
+            rounds += 1
+            if rounds == power:
+                held, rounds, power = dict(state), 0, 2 * power
 
     def _compute(self, term: Term, state: State, at: Span) -> Value:
         safe = defined(term)

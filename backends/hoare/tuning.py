@@ -4,16 +4,6 @@ BRIEFLY_SECONDS = 5.0
 """Seconds' worth of effort for whether the program has an output for every input, where that can only turn
 `unknown` into `refuted`."""
 
-ENDLESS_EFFORT = 8_000
-"""Effort for an input on which the program never ends: it takes proof and limit away from nothing, since
-it is asked last."""
-
-LASTING_EFFORT = 1_000
-"""For one question whether a predicate lasts round a loop: such questions are small, and there are many."""
-
-UNENDED_RUNS = 4
-"""Runs that were given up and for which a lasting predicate was sought in vain; after them no more are tried."""
-
 INPUTS_TRIED = 300
 """Inputs that the program is run on before a proof is tried, which takes far longer."""
 
@@ -28,9 +18,6 @@ STATEMENT_STEPS = 25
 
 RUN_STEPS = 5_000
 """Statements after which a run is given up: some milliseconds, for programs that mostly take a few dozen."""
-
-LOOP_STATES = 4
-"""Last states of a loop that are shown for a run that was given up."""
 
 NESTING = 120
 """Nesting beyond which a program is refused: later passes recurse over it."""

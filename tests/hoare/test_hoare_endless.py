@@ -1,4 +1,4 @@
-"""Loops: partial correctness is no proof, a run that never ends is found, random programs are held against runs."""
+"""Loops: partial correctness is no proof, a run that comes back to a state is found, random programs are held against runs."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from helpers import some
 from avow.backend_kit.protocol import Limits
 from avow.backends.hoare import BACKEND
 from avow.backends.hoare.backend import load
-from avow.backends.hoare.interpreter import Machine, NoEnd
+from avow.backends.hoare.interpreter import Endless, Machine, NoEnd
 from avow.base.verdict import Outcome, Verdict
 from avow.evaluation.evaluate import evaluate
 from avow.evidence.status import Status
@@ -44,10 +44,6 @@ def settle(folder: Path, program: str, formula: str = "y == 0", assume: str = ""
         [
             ("WHILE a == 7777 INVARIANT TRUE DO\n  SKIP", ""),  # one input in all
             ("WHILE a * a == 49 and b > 3 INVARIANT TRUE DO\n  SKIP", ""),
-            ("n := a\nWHILE n != 0 INVARIANT TRUE DO\n  n := n - 1", ""),  # from every negative number on
-            ("n := a\nWHILE n != 0 INVARIANT TRUE DO\n  n := n - 2", "a > 0"),  # from odd ones
-            ("q := x\nWHILE q > 0 INVARIANT TRUE DO\n  q := q / 2", ""),  # no state comes twice
-            ("n := 0\nc := b\nWHILE n < a INVARIANT TRUE DO\n  n := n + 1\n  c := c + 1\n  a := a + 1", ""),
             ("n := 0\nWHILE n < length(s) INVARIANT TRUE DO\n  IF s(n) != 5 THEN\n    n := n + 1", ""),
             ("IF mode == on THEN\n  IF b == 12345 THEN\n    WHILE a != b INVARIANT TRUE DO\n      SKIP", ""),
             ("n := 0\nWHILE m(n) == 1 INVARIANT TRUE DO\n  SKIP", ""),
@@ -58,17 +54,30 @@ def settle(folder: Path, program: str, formula: str = "y == 0", assume: str = ""
                 ),
                 "",
             ),
-            ("n := 0\nWHILE n < a INVARIANT TRUE VARIANT a - n DO\n  n := n - 1", ""),  # a variant that does not fall
         ],
         3,
         slow=2,
     ),
 )
-def test_a_run_that_never_ends_is_found(tmp_path: Path, loop: str, assume: str) -> None:
+def test_a_run_that_comes_back_to_a_state_is_found(tmp_path: Path, loop: str, assume: str) -> None:
     outcome = settle(tmp_path, f"y := 0\n{loop}\n", assume=assume)
     assert outcome.verdict is Verdict.REFUTED, outcome.summary
     assert "no output" in outcome.summary
     assert outcome.counterexample is not None
+
+
+@pytest.mark.parametrize(
+    ("loop", "verdict"),
+    [
+        ("n := a\nWHILE n != 0 INVARIANT TRUE DO\n  n := n - 1", Verdict.PARTIAL),
+        ("q := x\nWHILE q > 0 INVARIANT TRUE DO\n  q := q / 2", Verdict.PARTIAL),
+        ("n := 0\nWHILE n < a INVARIANT TRUE VARIANT a - n DO\n  n := n - 1", Verdict.UNKNOWN),
+    ],
+)
+def test_a_run_without_an_end_supports_nothing_if_no_state_comes_twice(
+    tmp_path: Path, loop: str, verdict: Verdict
+) -> None:
+    assert settle(tmp_path, f"y := 0\n{loop}\n").verdict is verdict
 
 
 @pytest.mark.parametrize(
@@ -193,8 +202,8 @@ def test_random_loops_against_running_them(tmp_path: Path, seed: int) -> None:
             state = {v.name: given.get(v.name, default_value(v.sort)) for v in checked.state}
             state |= {g.name: state[v.name] for v, g in checked.ghosts.items()}
             try:
-                end = Machine().run(checked.body, state)  # a fault, or a circle, would contradict the verdict
-            except NoEnd:
+                end = Machine().run(checked.body, state)  # a fault would contradict the verdict
+            except (Endless, NoEnd):
                 unended += 1
                 continue
             values = {f"in.{p.name}": given.get(p.name, default_value(p.sort)) for p in job.node.inputs}
