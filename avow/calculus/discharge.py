@@ -21,7 +21,6 @@ from avow.base.verdict import Verdict
 from avow.calculus.derivation import Case, ClauseName, Derivation, Goal, LoopForm, Phase, Rule, Settled, SideCondition
 from avow.calculus.entailment import NotProved, implied, kept_answers
 from avow.calculus.induction import INVARIANT, Deeper, further, steps
-from avow.calculus.repair import Offer, environment, initial_values, offers, providers
 from avow.calculus.variables import Frame, bearing, closest, indexed
 from avow.formulas.formula import free_variables
 from avow.language.terms import Term
@@ -111,39 +110,6 @@ def settle(
         }
     loops = tuple(_loop(frame, goal, part, settled) for part in goal.root.walk() if part.rule is Rule.R4)
     return Answers(goal, settled, loops)
-
-
-def would_hold(frame: Frame, goal: Goal, settled: Settled) -> tuple[tuple[Phase, tuple[Offer, ...]], ...]:
-    """For each refuted case of a side condition: clauses, any one of which would make it provable.
-
-    Empty if values flow in a cycle through the consumer within one step: a proof there might be circular.
-    """
-    condition = settled.condition
-    if settled.circle:
-        return ()
-    solver = _Solver(frame, frozenset(goal.nodes), Bounds(), frozenset(goal.root.assumed))
-    consumer = condition.consumer
-    same, before = premises = solver.wider(condition, solver.nearest(condition, solver.selected))[-1]
-    if any(consumer in frame.graph.ancestors(name, solver.selected) for name in same):
-        return ()
-    found: list[tuple[Phase, tuple[Offer, ...]]] = []
-    for case in settled.cases:
-        if case.verdict is not Verdict.REFUTED and case.counterexample is None:
-            continue
-        hypotheses, claim = solver.question(condition, case.phase, premises)
-        near = [name for name in condition.providers if name in same]
-        places = [*providers(frame, dict.fromkeys((*near, *same)))]
-        if case.phase is Phase.INITIAL:
-            places = [*initial_values(frame, consumer), *places]
-        if case.phase is Phase.LATER:
-            direct = [name for name in condition.providers if solver.feeds(name, consumer, delayed=True)]
-            places = [*providers(frame, direct, 1), *places, *environment(frame, (*before, consumer), 1)]
-        places += environment(frame, (*same, consumer))
-        spoken = set().union(*map(free_variables, (claim, *hypotheses.values())))
-        found.append(
-            (case.phase, offers(frame, hypotheses, claim, (p for p in places if not spoken.isdisjoint(p.ports))))
-        )
-    return tuple(found)
 
 
 @dataclass(slots=True)

@@ -14,10 +14,9 @@ from avow.base.tuning.effort import DEFEAT_EFFORT
 from avow.base.verdict import Counterexample, Hypothesis, Link, Outcome, Verdict
 from avow.calculus.composition import Composition
 from avow.calculus.derivation import Case, LoopForm, Phase, Settled, SideCondition
-from avow.calculus.discharge import Bounds, would_hold
+from avow.calculus.discharge import Bounds
 from avow.calculus.entailment import implied
 from avow.calculus.induction import INVARIANT, in_words
-from avow.calculus.repair import Offer
 from avow.calculus.variables import Frame
 from avow.calculus.wiring import start_name
 from avow.formulas.formula import negation
@@ -84,7 +83,7 @@ class SideQuestion:
         settled = composition.settled(goal, bounds).settled[self.condition]
         frame = composition.frame_of(goal)
         if settled.verdict is not Verdict.PROVED:
-            return as_far_as_shown(frame, _side_answer(frame, settled, would_hold(frame, goal, settled)))
+            return as_far_as_shown(frame, _side_answer(frame, settled))
         answer = _side_answer(frame, settled)
         found = composition.certificates.condition(goal, str(self.condition.about), bounds)
         fallen = composition.fallen(goal, self.condition.consumer) if found is None else ()
@@ -111,7 +110,7 @@ def as_far_as_shown(frame: Frame, answer: Answer) -> Answer:
     shown. A circular proof stays a refutation in any case."""
     if not frame.left_out or answer.verdict is not Verdict.REFUTED or "circle" in answer.details:
         return answer
-    kept = {key: value for key, value in answer.details.items() if key not in ("would_hold_if", "run")}
+    kept = {key: value for key, value in answer.details.items() if key != "run"}
     shown = answer.counterexample
     broken = None if shown is None else Counterexample(shown.values, _not_kept_to(frame), shown.trace, shown.loop)
     summary = f"{answer.summary.partition('; ')[0]}, but {_not_kept_to(frame)}"
@@ -125,8 +124,8 @@ def _not_kept_to(frame: Frame) -> str:
     return f"what has no formula of one step is left out, and may exclude it: {', '.join(frame.left_out)}"
 
 
-def _side_answer(frame: Frame, settled: Settled, repairs: Sequence[tuple[Phase, tuple[Offer, ...]]] = ()) -> Answer:
-    """The answer for a checked side condition; `repairs`: clauses that would make its refuted cases hold."""
+def _side_answer(frame: Frame, settled: Settled) -> Answer:
+    """The answer for a checked side condition."""
     condition = settled.condition
     details: dict[str, object] = {
         "consumer": condition.consumer,
@@ -153,21 +152,9 @@ def _side_answer(frame: Frame, settled: Settled, repairs: Sequence[tuple[Phase, 
     if bad.verdict is Verdict.REFUTED or bad.counterexample is not None:
         fails = bad.verdict is not Verdict.REFUTED
         summary = _induction_fails(condition, bad) if fails else _why_not(condition, bad)
-        summary += "".join(
-            would_hold_if(found, "" if phase is Phase.SAME_STEP else f"at {phase.value} ") for phase, found in repairs
-        )
-        listed = [
-            offer.data("" if phase is Phase.SAME_STEP else phase.value) for phase, found in repairs for offer in found
-        ]
-        details |= {"would_hold_if": listed} if listed else {}
         details |= {"induction": "fails"} if fails else {}
         return Answer(bad.verdict, summary, _counterexample(bad, condition), details=details)
     return Answer(Verdict.UNKNOWN, f"the solver gave up: {bad.reason or 'no reason given'}", details=details)
-
-
-def would_hold_if(found: Sequence[Offer], when: str = "") -> str:
-    """The text to append to a refutation's summary; empty without an offer."""
-    return f"; {when}it would hold if {', or if '.join(offer.text for offer in found)}" if found else ""
 
 
 def _why(frame: Frame, settled: Settled) -> str:

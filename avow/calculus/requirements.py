@@ -33,13 +33,12 @@ from avow.calculus.finder import Hint
 from avow.calculus.induction import INVARIANT, Written, further, in_words, steps
 from avow.calculus.ltl import TooLong, violation
 from avow.calculus.model_checking import cannot_run, explored, judge_property
-from avow.calculus.questions import Answer, as_far_as_shown, certified, would_hold_if
-from avow.calculus.repair import environment, initial_values, offers, providers
+from avow.calculus.questions import Answer, as_far_as_shown, certified
 from avow.calculus.scenario import CannotRun
 from avow.calculus.trials import composes
 from avow.calculus.variables import Frame, Observed, system_term
 from avow.evidence.record import COMPOSES
-from avow.formulas.formula import digest, free_variables, negation
+from avow.formulas.formula import digest, negation
 from avow.language.printer import show_term
 from avow.language.terms import FALSE, Term
 from avow.sanity.claims import triggers
@@ -102,8 +101,7 @@ class FormulaQuestion:
             return answer
         run, searched = self.broken_by_a_run(composition, bounds)
         if run is not None:
-            listed = {key: answer.details[key] for key in ("would_hold_if",) if key in answer.details}
-            return replace(run, details=run.details | listed)
+            return run
         if "step" not in answer.details and bounds.effort > quick:
             answer = self.attempt(composition, bounds, patient=True)
         if answer.verdict is not Verdict.UNKNOWN or not searched:
@@ -143,31 +141,7 @@ class FormulaQuestion:
         if delayed:
             return self.by_induction(composition, everything, goal, bounds, patient)
         assert last is not None
-        return self.repaired(frame, goal, self.not_proved(last))
-
-    def repaired(
-        self, frame: Frame, goal: Term, answer: Answer, further: Mapping[str, Term] | None = None, when: str = ""
-    ) -> Answer:
-        """A refutation, or a step at which induction fails, with clauses that would make the formula hold; other
-        answers unchanged."""
-        if not self.required or (answer.verdict is not Verdict.REFUTED and "induction" not in answer.details):
-            return answer
-        nodes = frame.graph.nodes
-        everything = _every_guarantee(frame)
-        hypotheses = self.known(frame, everything)
-        hypotheses |= dict(further or {})
-        spoken = free_variables(goal)
-        places = [place for place in providers(frame, nodes) if not spoken.isdisjoint(place.ports)]
-        places += environment(frame, nodes)
-        if when == Phase.INITIAL.value:
-            delayed = [e.target.node for e in frame.graph.edges if e.delayed]
-            places += [place for node in dict.fromkeys(delayed) for place in initial_values(frame, node)]
-        found = offers(frame, hypotheses, goal, places)
-        if not found:
-            return answer
-        listed = {"would_hold_if": [offer.data(when) for offer in found]}
-        summary = would_hold_if(found, f"at {when} " if when else "")
-        return replace(answer, summary=answer.summary + summary, details=answer.details | listed)
+        return self.not_proved(last)
 
     def by_induction(
         self, composition: Composition, everything: tuple[str, ...], goal: Term, bounds: Bounds, patient: bool
@@ -180,7 +154,7 @@ class FormulaQuestion:
         if patient and first.verdict is Verdict.UNKNOWN:
             first = self.ask(now | initial, goal, bounds)
         if first.verdict is not Verdict.PROVED:
-            return self.repaired(frame, goal, self.not_proved(first, "at the first step"), initial, Phase.INITIAL.value)
+            return self.not_proved(first, "at the first step")
         itself = {f"{self.name} one step before": system_term(frame, self.formula, 1)}
         before = self.known(frame, everything, 1)
         later = first
@@ -200,9 +174,8 @@ class FormulaQuestion:
         if more.run is not None:
             summary = f"a run of {more.steps} steps makes {self.name} false"
             details: dict[str, object] = {"genuine": True, "run": more.steps}
-            answer = Answer(Verdict.REFUTED, summary, more.run, bound={"steps": more.steps}, details=details)
-            return self.repaired(frame, goal, answer, itself | before, Phase.LATER.value)
-        return self.repaired(frame, goal, self.induction_fails(later), itself | before, Phase.LATER.value)
+            return Answer(Verdict.REFUTED, summary, more.run, bound={"steps": more.steps}, details=details)
+        return self.induction_fails(later)
 
     def induction_fails(self, answer: Entailment) -> Answer:
         """The answer if some step does not preserve the formula and it is unknown whether that step is ever reached."""

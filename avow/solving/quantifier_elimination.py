@@ -1,76 +1,28 @@
-"""The weakest further assumption under which hypotheses imply a goal.
+"""Formulas without quantifiers that are equivalent to given ones, and Z3's expressions read back as terms.
 
-If an entailment fails, `remedy` eliminates all variables except those that may be constrained (a node's inputs, say)
-from "the hypotheses imply the goal", and reads the result back as a term of the contract. It works where quantifier
-elimination does: linear arithmetic, enumerations and truth values; no functions, no strings.
+Elimination works for linear arithmetic, enumerations and truth values; not for functions or strings.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from fractions import Fraction
 
-from avow.base.records import dataclass
 from avow.base.tuning.effort import ELIMINATION_SECONDS, ELIMINATION_STEPS, STEPS
-from avow.base.verdict import Verdict
-from avow.formulas.formula import conjunction, disjunction, free_variables, negation, substitute
+from avow.formulas.formula import conjunction, disjunction, free_variables, negation
 from avow.formulas.negation_normal_form import push_negations
 from avow.language import terms as t
 from avow.language.operators import FLIPPED
 from avow.language.sorts import BOOL, INTEGER, REAL, BoolSort, EnumSort, IntegerSort, NaturalSort, RealSort
 from avow.solving.checking import charge, put
-from avow.solving.questions import entails, solve
-from avow.solving.translation import Expr, Translator, Unsupported, same_session
+from avow.solving.translation import Expr, Translator, Unsupported
 from avow.solving.z3_module import z3
-
-
-@dataclass(frozen=True, slots=True)
-class Remedy:
-    """An assumption with which the goal follows. `weakest` says that no weaker one about these variables suffices."""
-
-    assumption: t.Term
-    weakest: bool
-
-
-@same_session()
-def remedy(
-    hypotheses: Mapping[str, t.Term], goal: t.Term, about: Collection[t.Variable], *, effort: int = 5_000
-) -> Remedy | None:
-    """The weakest assumption about the variables `about` that makes the hypotheses imply the goal.
-
-    None if there is none (it would contradict the hypotheses), or if none can be found or read back in time. The result
-    has been checked: with it the goal is proved, and it is consistent with the hypotheses.
-    """
-    whole = t.Implies(conjunction(hypotheses.values()), goal)
-    others = sorted(free_variables(whole) - frozenset(about), key=lambda v: (v.qualified, repr(v.sort)))
-    if not eliminable(whole):
-        return None
-    renamed = {v: t.Variable(t.Role.BOUND, f"any {v.qualified}", v.sort) for v in others}
-    body = substitute(whole, renamed)
-    exact: t.Term = t.Quantified(t.Quantifier.FORALL, tuple(renamed.values()), body) if renamed else body
-    try:
-        raw = _eliminate(exact)
-    except (Unsupported, z3.Z3Exception, RecursionError):  # terms too deep to be read back are useless to people
-        return None
-    if raw is None:
-        return None
-    found = _simplified(raw, hypotheses, goal, effort)
-    together = {**hypotheses, "the remedy": found}
-    if len(together) == len(hypotheses) or solve(together, effort=effort).status != "sat":
-        return None
-    if entails(together, goal, effort=effort, whether=True).verdict is not Verdict.PROVED:
-        return None
-    # Weaker than every sufficient assumption, as far as the hypotheses leave a difference.
-    context = [h for h in hypotheses.values() if free_variables(h) <= frozenset(about)]
-    weakest = entails([*context, exact], found, effort=effort, whether=True).verdict is Verdict.PROVED
-    return Remedy(found, weakest)
-
 
 ELIMINABLE = (BoolSort, RealSort, IntegerSort, NaturalSort, EnumSort)
 
 
 def eliminable(term: t.Term) -> bool:
-    """Whether all the term's free variables have sorts that `remedy` supports."""
+    """Whether all the term's free variables have sorts that `eliminated` supports."""
     return all(isinstance(v.sort, ELIMINABLE) for v in free_variables(term))
 
 
@@ -79,7 +31,7 @@ def eliminated(formula: t.Term) -> t.Term | None:
     Z3's tactics have lost parts of a formula before."""
     try:
         return _eliminate(formula)
-    except (Unsupported, z3.Z3Exception, RecursionError):
+    except (Unsupported, z3.Z3Exception, RecursionError):  # terms too deep to be read back
         return None
 
 
@@ -104,30 +56,6 @@ def _eliminate(formula: t.Term) -> t.Term | None:
     reader = TermReader(translator, free)
     options = [conjunction(reader.formula(expr) for expr in subgoal) for subgoal in result]
     return push_negations(disjunction(options))
-
-
-def _simplified(term: t.Term, hypotheses: Mapping[str, t.Term], goal: t.Term, effort: int) -> t.Term:
-    """Without the parts that the hypotheses make superfluous: alternatives that they exclude or that are stronger than
-    another, conditions that they imply."""
-    known = list(hypotheses.values())
-    limit = min(effort, 1_000)
-    alternatives = list(term.items) if isinstance(term, t.Or) else [term]
-    kept: list[t.Term] = []
-    for alternative in alternatives:
-        parts = list(alternative.items) if isinstance(alternative, t.And) else [alternative]
-        if solve([*known, *parts], effort=limit).status == "unsat":
-            continue
-        for part in tuple(parts):
-            rest = [p for p in parts if p is not part]
-            # Weaken an alternative as far as it still suffices.
-            if entails([*known, *rest], goal, effort=limit, whether=True).verdict is Verdict.PROVED:
-                parts = rest
-        kept.append(conjunction(parts))
-    for one in tuple(kept):
-        others = [k for k in kept if k is not one]
-        if others and entails([*known, one], disjunction(others), effort=limit, whether=True).verdict is Verdict.PROVED:
-            kept = others
-    return disjunction(kept)
 
 
 class TermReader:

@@ -320,20 +320,6 @@ def test_examples_after_pactis_own(tmp_path: Path, name: str) -> None:
 
 
 @pytest.mark.slow
-def test_what_pacti_finds_is_what_avow_offers(tmp_path: Path) -> None:
-    """Where the nodes assume too little, the repair that Avow offers is the assumption that Pacti computes."""
-    from .make import outcomes
-
-    parts, _ = EXAMPLES["series"]
-    told = by_pacti(parts)
-    assert told is not None
-    found = outcomes(make(tmp_path / "offers", "".join(part.rcl() for part in parts)))
-    texts = [str(o["clause"]) for out in found.values() for o in out.details.get("would_hold_if", [])]  # type: ignore[attr-defined]
-    assert any("in.i" in text for text in texts), texts
-    assert implies(told.assumed, [at_most(0.25, i=1), at_least(0, i=1)])
-
-
-@pytest.mark.slow
 def test_feedback_is_refused_by_pacti_whatever_it_says(tmp_path: Path) -> None:
     """Pacti composes no loop into which a constrained input leads. Avow refuses the circular one alone."""
     loop = (

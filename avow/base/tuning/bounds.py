@@ -37,9 +37,6 @@ WITNESSES_TRIED = 4
 """Tuples of the hypotheses' own names that are put in for `exists`: each is a question, and the right one mostly is
 the first of its types."""
 
-VALUES_TRIED = 24
-"""Values that are tried: each is a question to the solver."""
-
 DEEPEST_INDUCTION = 3
 """The k of k-induction, at most: each step adds a copy of the system to the question."""
 
@@ -82,15 +79,6 @@ number grows with this as an exponent."""
 
 POINTS_OF_ARGUMENTS = 10_000
 """Combinations of values that are listed; with more, none are."""
-
-OFFER_HYPOTHESES = 40
-"""Beyond so many hypotheses, eliminating variables takes longer than an offer may."""
-
-OFFER_PLACES = 8
-"""Clauses for which an offer is sought: nobody reads more."""
-
-OFFER_LENGTH = 300
-"""Characters of a clause that is worth offering: a longer one explains nothing."""
 
 COMPLETIONS = 3
 """Values tried in the places that the search left undecided."""

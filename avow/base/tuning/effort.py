@@ -109,20 +109,9 @@ CERTIFICATE_NET_MS = 60_000
 CUT_EFFORT = 2_000
 """For whether a node may answer an input otherwise than was found: hundreds of inputs are asked about."""
 
-OFFERS_EFFORT = 3_000
-"""For all the offers to one failed question together; an offer is a service, not part of the answer."""
-
-OFFER_STEP_EFFORT = 500
-"""For one question of an offer: six of them fit into the time for all."""
-
-OFFER_WRITING_STEPS = 2_000
-"""Steps that each part of a question's formulas counts for where an offer is sought at one place: they are written down
-anew for each of some tens of values. Four assumptions that mix limits in ms and in steps have 2,000 parts, which took a
-second at each place."""
-
 ELIMINATION_STEPS = 250_000
-"""Z3's steps to eliminate variables; the tests' offers took 4,000 at most, two rounds of a game over a limit in seconds
-180,000. Z3 keeps no limit where it applies what eliminates; so it is first run as a solver, which has one."""
+"""Z3's steps to eliminate variables; two rounds of a game over a limit in seconds took 180,000. Z3 keeps no limit where
+it applies what eliminates; so it is first run as a solver, which has one."""
 
 ELIMINATION_SECONDS = 60
 """After this time an elimination hangs: the steps that it is allowed take less than half a second."""
