@@ -27,10 +27,10 @@ from avow.language.contract import ClauseKind, Node
 from avow.language.sorts import FunctionSort, IntegerSort, NaturalSort, RealSort
 from avow.language.terms import Compare, Not, Role, Term, Variable
 from avow.sanity.claims import Claim, Property, claims, triggers
-from avow.sanity.conflicts import conflicts, contradictions
+from avow.sanity.conflicts import conflicts
 from avow.sanity.over_runs import OverRuns
 from avow.sanity.realizability import possible, realizable
-from avow.sanity.results import CUT_SHORT, Bounds, Finding, Patience, SanityResult, as_outcome, listing, never_demanded
+from avow.sanity.results import Bounds, Finding, Patience, SanityResult, as_outcome, listing, never_demanded
 from avow.sanity.witness_search import Formulas, Group, Realizability, groups
 from avow.solving.limits import spent
 from avow.solving.questions import solve
@@ -142,8 +142,7 @@ class _Analysis:
     # -- the whole contract --------------------------------------------------------------------------------------------
 
     def _satisfiable(self) -> Finding:
-        finding = self._possible(self.assumptions, "no input meets {} together", "no input meets {}")
-        return self._with_all_sets(finding, self.assumptions)
+        return self._possible(self.assumptions, "no input meets {} together", "no input meets {}")
 
     def _in_every_size(self, finding: Finding, because: str = "") -> Finding:
         """The finding, turned into a refutation if it fails for some number of elements of the unspecified types."""
@@ -169,20 +168,7 @@ class _Analysis:
             finding = self._possible(together, *texts)
         if finding.verdict is Verdict.REFUTED and self._other("assumptions-satisfiable").verdict is Verdict.REFUTED:
             return replace(finding, because="assumptions-satisfiable")
-        return self._with_all_sets(finding, together)
-
-    def _with_all_sets(self, finding: Finding, formulas: Mapping[str, Term]) -> Finding:
-        """The finding with every minimal set of contradictory formulas, if they contradict each other."""
-        if finding.verdict is not Verdict.REFUTED or not finding.clauses:
-            return finding
-        sets, complete = contradictions(formulas, finding.clauses, effort=self.patience.full // 2, seed=self.seed)
-        if len(sets) == 1 and complete:
-            return finding
-        text = ", nor ".join((finding.explanation, *map(listing, sets[1:])))
-        shown = tuple((s, Counterexample(explanation=f"nothing meets {listing(s)}")) for s in sets)
-        return replace(
-            finding, explanation=text + ("" if complete else CUT_SHORT), conflicts=shown, cut_short=not complete
-        )
+        return finding
 
     def _realizability(self) -> tuple[Realizability, bool]:
         """The answer, and whether it holds only for the scenario."""
@@ -225,7 +211,7 @@ class _Analysis:
             return Finding(verdict, given, answer.needed, engine=answer.engine, bounded=bounded)
         if answer.verdict is not Verdict.REFUTED:
             return Finding(Verdict.UNKNOWN, answer.reason, engine=answer.engine)
-        found, complete = conflicts(
+        found = conflicts(
             self.inputs,
             self.outputs,
             self.assumptions,
@@ -241,8 +227,8 @@ class _Analysis:
         # A conflict between guarantees is more informative than one guarantee that cannot be met by itself.
         clauses, shown = next((pair for pair in listed if len(pair[0]) > 1), listed[0])
         because = "consistent" if self._other("consistent").verdict is Verdict.REFUTED else None
-        text = f"for some inputs no output meets {listing(clauses)}{'' if complete else CUT_SHORT}"
-        return Finding(Verdict.REFUTED, text, clauses, shown, listed, because, answer.engine, cut_short=not complete)
+        text = f"for some inputs no output meets {listing(clauses)}"
+        return Finding(Verdict.REFUTED, text, clauses, shown, listed, because, answer.engine)
 
     # -- one clause ----------------------------------------------------------------------------------------------------
 

@@ -64,7 +64,6 @@ class Result:
     counterexample: Shown | None
     explanation: str
     conflicts: tuple[Conflict, ...]
-    cut_short: bool
     because: str | None
     engine: str
     bounded: bool
@@ -85,7 +84,7 @@ def to_document(result: SanityResult) -> Result:
     conflicts = tuple(Conflict(clauses, _shown(example)) for clauses, example in result.conflicts)
     return Result(
         *(result.node, asked.about, asked.subject, asked.name, asked.sentence, result.verdict, asked.severity),
-        *(result.clauses, None if shown is None else _shown(shown), result.explanation, conflicts, result.cut_short),
+        *(result.clauses, None if shown is None else _shown(shown), result.explanation, conflicts),
         *(result.because, result.engine, result.bounded, round(result.seconds, 3)),
         None if span is None else Place(span.file, span.line, span.column),
     )

@@ -33,14 +33,12 @@ class Finding:
     """The clauses that a refutation or a proof depends on (for conflicts, of the first), without the node's name."""
     counterexample: Counterexample | None = None
     conflicts: tuple[tuple[tuple[str, ...], Counterexample], ...] = ()
-    """Every conflict found: a minimal set of clauses that cannot all be met, with an input and what each demands."""
+    """For each group of guarantees, a minimal set that cannot be met, with an input and what each demands there."""
     because: str | None = None
     """The name of the result of which this one is only a consequence."""
     engine: str = "z3"
     bounded: bool = False
     """The answer holds only for the scenario."""
-    cut_short: bool = False
-    """The search for conflicts was cut short: there may be others, or smaller ones."""
     example: Mapping[Variable, Value] = field(default_factory=dict)
     """Values for which the claim holds, if known."""
 
@@ -85,7 +83,6 @@ class Patience:
         return max(1, int(self.full * share) // (1 if serious else 3))
 
 
-CUT_SHORT = "; the search for conflicts was cut short: there may be others"
 WITHIN = bound(
     "scenario.values",
     "scenario: inputs and quantified variables have the values that the plan's scenario gives them, and no others",
@@ -102,8 +99,6 @@ def as_outcome(identity: str, node: str, name: str, result: SanityResult | None)
         details["because"] = result.because
     if result.conflicts:
         details["conflicts"] = [{"clauses": list(c), "counterexample": e.text()} for c, e in result.conflicts]
-    if result.cut_short:
-        details["cut_short"] = True
     return Outcome(
         identity,
         result.verdict,

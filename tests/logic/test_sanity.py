@@ -312,20 +312,6 @@ def test_conflicts_about_different_outputs_are_all_shown() -> None:
     assert all(shown.values for _, shown in found.conflicts)
 
 
-def test_all_minimal_sets_of_a_contradiction_are_shown() -> None:
-    text = """
-    node n {
-      inputs( d : REAL ) outputs( v : REAL, w : REAL ) topics()
-      assume( d < 1 )
-      guarantee( v > 3 ) guarantee( v < 2 ) guarantee( w > d ) guarantee( w < d ) guarantee( w > 0 ) guarantee( d > 1 )
-    }"""
-    found = {r.name: r for r in analyse(contract(text).nodes[0], wanted={"consistent"})}["consistent"]
-    sets = {frozenset(clauses) for clauses, _ in found.conflicts}
-    assert sets == {frozenset({"G1", "G2"}), frozenset({"G3", "G4"}), frozenset({"A1", "G6"})}
-    assert found.explanation.startswith("no inputs and outputs meet ")
-    assert found.explanation.count(", nor ") == 2
-
-
 @pytest.mark.parametrize("memory", ["", "guarantee w ( in.p -> within[3 steps](out.q) )"])
 def test_of_several_conditions_the_one_that_cannot_come_about_is_named(memory: str) -> None:
     text = f"""node n {{ inputs( stop : BOOL, p : BOOL ) outputs( v : REAL, alarm : BOOL, q : BOOL ) topics()

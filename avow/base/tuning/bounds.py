@@ -118,9 +118,6 @@ POINTWISE_PARTS = 100
 SEQUENCE_SHOWN = 1_000
 """Elements of a sequence that a solver's model is read back into: beyond it, the model is given up."""
 
-CONFLICTS = 64
-"""Conflicts that are looked for: whoever mends so many asks again."""
-
 SIZES_TRIED = (1, 2, 3)
 """Sizes of an unspecified type that a contract should allow, beside larger ones: with one element nothing differs, two
 are enough for `!=`, three for what two of them are not."""

@@ -129,9 +129,6 @@ WITNESS_PATIENT_EFFORT = 300
 """From this much effort on, an attempt gets all known facts about the chosen constants. Short attempts are quicker
 without them."""
 
-CONFLICT_SEARCH_EFFORT = 1_000
-"""For whether some set of guarantees can be met at every input: small sets are decided soon, or mostly not at all."""
-
 DEFEAT_EFFORT = 2_000
 """For inputs, chosen ahead, that leave a node with memory no outputs: those of published contracts took a tenth."""
 
