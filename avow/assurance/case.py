@@ -64,7 +64,7 @@ from avow.assurance.remarks import remarks
 from avow.assurance.requirement_views import held, requirement_view
 from avow.assurance.risk_gates import standard_gate
 from avow.assurance.standards import standard_view
-from avow.assurance.summary import limits, not_shown, open_items
+from avow.assurance.summary import open_items
 from avow.assurance.support import (
     Names,
     assumption_claims,
@@ -217,9 +217,6 @@ def conclude(facts: Facts) -> Case:
         environment=facts.environment,
         findings=findings,
         gates=found,
-        single_method=single,
-        limits=limits(facts, views),
-        not_shown=not_shown(facts, views, requirements),
         tools=facts.tools,
         methods=facts.methods,
         discrepancies=facts.discrepancies or (),

@@ -12,7 +12,7 @@ from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.files import read_regular
 from avow.evidence.ledger import Line
 
-SCHEMA = "https://avow.invalid/schemas/case-6"
+SCHEMA = "https://avow.invalid/schemas/case-7"
 """The format's name in ``report.json``; its number increases with incompatible changes."""
 
 

@@ -438,10 +438,6 @@ class Case:
     environment: tuple[EnvironmentView, ...]
     findings: tuple[Handled, ...]
     gates: tuple[Gate, ...]
-    single_method: tuple[str, ...]
-    """Guarantees that rest on one method alone."""
-    limits: tuple[tuple[str, str], ...]
-    not_shown: tuple[str, ...]
     tools: tuple[ToolInfo, ...]
     methods: tuple[MethodInfo, ...]
     discrepancies: tuple[Discrepancy, ...]

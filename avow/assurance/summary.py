@@ -1,4 +1,4 @@
-"""The parts of a case that warn the reader: open items, limits, and what is not shown."""
+"""The open items of a case: what a reader has to know before believing the rest."""
 
 from __future__ import annotations
 
@@ -9,8 +9,7 @@ from avow.assurance.facts import Facts
 from avow.assurance.model import Currency, DerivationView, Handled, ObligationView, OpenItem, RequirementView
 from avow.assurance.naming import derivation_claim, requirement_claim, short
 from avow.base.plain import count, listed
-from avow.base.verdict import Link, Object, Verdict
-from avow.evidence.obligation import Kind
+from avow.base.verdict import Object
 from avow.evidence.record import CASE, Evidence
 from avow.evidence.status import Status, weigh
 
@@ -235,87 +234,3 @@ def _vacuous(view: ObligationView) -> OpenItem:
         advice=True,
         title=view.obligation.claim,
     )
-
-
-def limits(facts: Facts, views: Sequence[ObligationView]) -> tuple[tuple[str, str], ...]:
-    """The limits of the answers: for reproduction, and for judging the value of a bounded answer."""
-    bounds: dict[tuple[str, str, str], list[str]] = {}
-    for view in views:
-        for record in view.records:
-            if record.bound:
-                text = ", ".join(f"{name} = {_short(value)}" for name, value in record.bound.items())
-                bounds.setdefault((view.obligation.node, record.method, text), []).append(view.obligation.name)
-    found = [(f"{node}: {method} ({listed(names, 12)})", text) for (node, method, text), names in bounds.items()]
-    return (*facts.run.limits.items(), *found)
-
-
-def _short(value: object) -> str:
-    """A mapping by its keys (files and their digests are listed with the evidence)."""
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    return ", ".join(map(str, value)) if isinstance(value, dict | list | tuple) else str(value)
-
-
-def not_shown(
-    facts: Facts, views: Sequence[ObligationView], requirements: Sequence[RequirementView]
-) -> tuple[str, ...]:
-    """The statements that this case does not support."""
-    guarantees = [v for v in views if v.obligation.kind is Kind.GUARANTEE]
-    told = [v for v in views if v.obligation.kind in (Kind.GUARANTEE, Kind.REQUIREMENT)]
-
-    def of(among: Iterable[ObligationView], *statuses: Status) -> list[str]:
-        return [short(v.id) for v in among if v.status in statuses]
-
-    about = [
-        (
-            [r.id for r in requirements if not r.formula and not r.temporal],
-            (
-                "stated in prose. That the guarantees named amount to the requirement is a person's judgement; no tool "
-                "has checked it"
-            ),
-        ),
-        (
-            of(told, Status.CHECKED),
-            "checked exhaustively, but only within the finite scenario; nothing is said outside it",
-        ),
-        (
-            of(told, Status.TESTED, Status.MONITORED),
-            "observed on samples; other inputs and other runs may behave otherwise",
-        ),
-        *_protocols(views),
-        (of(guarantees, Status.REVIEWED, Status.JUSTIFIED), "rests on a person's word alone"),
-        (
-            [short(v.id) for v in guarantees if v.status.supports and v.link in (Link.MAPPED, Link.GUIDED)],
-            (
-                "what was verified is tied to the formula by a table or a judgement of a person, not by translation; "
-                "that the tie is right is not shown"
-            ),
-        ),
-        (
-            [e.port for e in facts.environment if e.assume],
-            "what is assumed of these environment inputs is believed for a reason, not shown",
-        ),
-    ]
-    lines = [f"{listed(names, 12)}: {text}." for names, text in about if names]
-    used = {r.backend for view in views for r in view.records}
-    if any(m.strength in (Verdict.PROVED, Verdict.CHECKED) and m.name in used for m in facts.methods):
-        lines.append(
-            "A proof or check is about the program or model that it was given; that the deployed software is that "
-            "program, on that hardware, is not shown."
-        )
-    lines.append(
-        "That the contracts say what was meant, and that the requirements are the right ones, is for people to judge."
-    )
-    return tuple(lines)
-
-
-def _protocols(views: Sequence[ObligationView]) -> Iterable[tuple[list[str], str]]:
-    """How measured runs were made, in the plan's words: 47 of 47 in a simulation is not 47 of 47 on the robot."""
-    found: dict[str, list[str]] = {}
-    for view in views:
-        for record in view.records:
-            match record.details.get("protocol"):
-                case str(text) if text.strip():
-                    found.setdefault(" ".join(text.split()).rstrip("."), []).append(short(view.id))
-    for text, names in found.items():
-        yield names, f"measured under this protocol, and not beyond it: {text}"

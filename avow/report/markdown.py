@@ -15,11 +15,13 @@ from avow.report.short import escaped, markdown_head
 from avow.report.source import plain_lines
 from avow.report.wording import (
     NO_HAZARD,
+    NOT_SHOWN,
     bound_text,
     clean,
     gate_line,
     hazard_rows,
     mutation,
+    not_shown,
     open_line,
     remark_line,
     where,
@@ -89,7 +91,7 @@ def render_markdown(case: Case) -> str:
         ),
         _table(("what", "which"), ((escaped(t.what), escaped(t.which)) for t in case.trusted)),
         "## What is not shown",
-        "\n".join(f"- {escaped(line)}" for line in case.not_shown),
+        "\n".join(f"- {escaped(line)}" for line in (*map(not_shown, case.deficits), *NOT_SHOWN)),
         *_contracts(case),
     ]
     return "\n\n".join(part for part in parts if part) + "\n"

@@ -106,6 +106,8 @@ def environment() -> Environment:
         "mutation": wording.mutation,
         "details_text": wording.details_text,
         "outline": wording.outline,
+        "NOT_SHOWN": wording.NOT_SHOWN,
+        "not_shown": wording.not_shown,
         "overhead": wording.overhead,
         "protocol": wording.protocol,
         "rerun": wording.rerun,
@@ -127,7 +129,6 @@ def fill(template: str, **given: Any) -> str:
 def render_page(case: Case, json_digest: str = "") -> str:
     """The overview of every claim. Deterministic: same case, same bytes. `json_digest` is the digest of the report.json
     beside it: with it no edit of that file goes unnoticed, not even of a part that no other format shows."""
-    single = set(case.single_method)
     matrix = _matrix(case)
     listed = [item for item in case.open_items if not item.advice]
     nodes = by_node(case)
@@ -148,7 +149,6 @@ def render_page(case: Case, json_digest: str = "") -> str:
         findings={view.id: _found(view) for view in case.obligations},
         advice=[item for item in case.open_items if item.advice and item.kind != REMARK],
         remarks=[item for item in case.open_items if item.kind == REMARK],
-        single=[view for view in case.obligations if view.id in single],
         justified=_justified(case),
         used_methods=_used_methods(case),
         statuses=[s for s in Status if any(view.standing is s for view in case.obligations)],

@@ -27,7 +27,9 @@ from avow.report.source import plain_lines
 from avow.report.wording import (
     MARKS,
     NO_HAZARD,
+    NOT_SHOWN,
     bound_text,
+    by_claim,
     clean,
     dangers,
     hazard_rows,
@@ -82,7 +84,7 @@ def _data(case: Case) -> dict[str, Any]:
         "facts": [*facts, *case.digests],
         "first": _first(case),
         "assumptions": [_assumption(s) for s in case.assumptions],
-        "deficits": [[str(w.count), w.words, w.why] for w in case.deficits],
+        "deficits": [[str(w.count), w.words, w.why, by_claim(w)] for w in case.deficits],
         "modules": [_module(module) for module in requirement_modules(case)],
         "hazards": hazard_rows(case),
         "no_hazard": NO_HAZARD,
@@ -129,9 +131,7 @@ def _data(case: Case) -> dict[str, Any]:
             + (" (expired)" if f.expired else "")
             for f in case.findings
         ],
-        "single": [short(name) for name in case.single_method],
-        "limits": [*case.limits[:400]],
-        "not_shown": [*more, *case.not_shown],
+        "not_shown": [*more, *NOT_SHOWN],
         "sources": [_source(source) for source in case.sources if source.is_contract],
     }
     plain: dict[str, Any] = _clean(found)

@@ -10,7 +10,7 @@ from typing import Any
 from urllib.parse import quote
 
 from avow.assurance import naming
-from avow.assurance.answers import Level, Tone
+from avow.assurance.answers import Deficit, Level, Tone
 from avow.assurance.hazards import WORST_FIRST
 from avow.assurance.model import Case, EvidenceView, ObligationView, RequirementView
 from avow.assurance.naming import cut
@@ -378,3 +378,20 @@ def hazard_rows(case: Case) -> list[tuple[str, str, str, str]]:
 
 
 NO_HAZARD = "No hazard is declared in the plan: nothing shows that the requirements cover what may do harm."
+
+
+NOT_SHOWN = (
+    "A proof or check is about the program or model that it was given, and not about the software and hardware in use.",
+    "That the contracts say what was meant, and that the requirements are the right ones, is for people to judge.",
+)
+"""What no report shows."""
+
+
+def by_claim(deficit: Deficit) -> str:
+    """The claims, or other names, that a deficit is about."""
+    return listed([naming.short(claim) for claim in deficit.claims], 12)
+
+
+def not_shown(deficit: Deficit) -> str:
+    """A deficit with its claims and its meaning, as a sentence."""
+    return f"{deficit.count} {deficit.words}: {by_claim(deficit)}. {deficit.why}"

@@ -403,8 +403,9 @@ def test_vanished_obligations_leave_orphans_not_support() -> None:
 
 def test_single_methods_and_hypotheses_are_listed() -> None:
     found = rover_case()
-    assert "rover/agent/guarantee/next_waypoint" in found.single_method
-    assert "rover/radiationSensor/guarantee/low" not in found.single_method
+    alone = next(d.claims for d in found.deficits if d.key == "single")
+    assert "rover/agent/guarantee/next_waypoint" in alone
+    assert "rover/radiationSensor/guarantee/low" not in alone
     assert "percepts are edge-triggered" in [a.text for a in found.assumptions]
 
 
