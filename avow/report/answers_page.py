@@ -20,10 +20,9 @@ from avow.base.tuning.shown import NODE_BOXES, SHEET_LETTERS
 from avow.evidence.record import Evidence
 from avow.evidence.status import Status, weigh
 from avow.report import wording
-from avow.report.bowtie import bowtie
 from avow.report.goals import doubts
 from avow.report.modules import NodeModule, RequirementModule, conditions, node_modules, requirement_modules
-from avow.report.page import fill, known_pages, svg_image
+from avow.report.page import fill, known_pages
 
 KINDS = 7
 """Kinds of deficit in words on the first screen, the weightiest first: a link counts and explains all."""
@@ -54,11 +53,9 @@ def render_answers(case: Case, json_digest: str = "") -> str:
         "answers.html.j2",
         case,
         json_digest,
-        bowtie=lambda view: svg_image(bowtie(view)),
         brief=wording.gate_line,
         dangers=wording.dangers(case),
         doubts=[text for text, _, left, _ in sorted(doubts(case), key=lambda doubt: -doubt[2])[:DOUBTS] if left],
-        no_hazard=wording.NO_HAZARD,
         weakest=wording.weakest,
         by_level=by_level,
         content=baseline_of(case).content,

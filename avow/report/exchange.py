@@ -3,34 +3,27 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable
+from dataclasses import replace
 from typing import Any
 from urllib.parse import quote
-from xml.sax.saxutils import escape, quoteattr
 
 from avow.assurance.answers import EARLIER, Level
 from avow.assurance.codec import to_json
-from avow.assurance.model import Case, ObligationView
+from avow.assurance.model import Case, Gate, ObligationView, RequirementView
 from avow.assurance.naming import sanity_property, short
 from avow.base.files import sha256
+from avow.base.records import dataclass
 from avow.base.rendering import sarif_place
 from avow.evidence.obligation import Kind
 from avow.evidence.status import Status
 from avow.report.layout import json_text
-from avow.report.wording import MEANINGS, banner_tone, clean, tone
+from avow.report.page import fill
+from avow.report.wording import MEANINGS, banner_tone, of_nodes, tone
 
 
 def render_json(case: Case) -> str:
     """The whole case (schema: docs/schemas/case.schema.json)."""
     return json_text(to_json(case))
-
-
-def by_node(views: Iterable[ObligationView]) -> dict[str, list[ObligationView]]:
-    """The claims of each node, in the order given."""
-    found: dict[str, list[ObligationView]] = {}
-    for view in views:
-        found.setdefault(view.obligation.node, []).append(view)
-    return found
 
 
 def headline(view: ObligationView) -> str:
@@ -51,6 +44,11 @@ def _result_of(case: Case) -> str:
     return "FAILED" if not case.good else "WARNED" if banner_tone(case) == "open" else "PASSED"
 
 
+def _fails(view: ObligationView) -> bool:
+    """Whether a claim is refuted, and the plan says nothing of it."""
+    return tone(view.status) == "bad" and not view.handled
+
+
 def _passes(case: Case, view: ObligationView) -> bool:
     """Whether a claim passes: not if a person's reason replaces evidence, and a requirement's claim only if the
     requirement itself is shown."""
@@ -61,83 +59,53 @@ def _passes(case: Case, view: ObligationView) -> bool:
 # -- JUnit XML ------------------------------------------------------------------------------------------------------
 
 
+@dataclass(frozen=True, slots=True)
+class _Row:
+    """A test case of a suite; `outcome` is ``failure``, ``error``, ``skipped`` or empty: it passes."""
+
+    group: str
+    name: str
+    outcome: str
+    message: str = ""
+    type: str = ""
+    seconds: float = 0.0
+
+
 def render_junit(case: Case) -> str:
     """A suite for the gates, one for the requirements, and one for each node. Refuted claims fail; claims that are not
     shown are skipped, never passed: the gates decide whether that matters."""
-    suites = [_gates_suite(case), *([_requirements_suite(case)] if case.requirements else [])]
-    suites += [_suite(case, node, views) for node, views in by_node(case.obligations).items()]
-    total = [sum(numbers) for numbers in zip(*(suite[1] for suite in suites), strict=True)]
-    head = f"<testsuites name={_attribute(case.system)} {_numbers(total)}>"
-    return '<?xml version="1.0" encoding="UTF-8"?>\n' + head + "\n" + "".join(s[0] for s in suites) + "</testsuites>\n"
+    suites = [("gates", list(map(_of_gate, case.gates)))]
+    if case.requirements:
+        suites.append(("requirements", [_of_requirement(r, case) for r in case.requirements]))
+    suites += [(node, [_of_claim(v, case) for v in views]) for node, views in of_nodes(case.obligations).items()]
+    return fill("junit.xml.j2", case=case, suites=suites, result=_result_of(case))
 
 
-def _gates_suite(case: Case) -> tuple[str, list[int]]:
-    rows, failures = [], 0
-    for gate in case.gates:
-        inside = f"<system-out>{escape(clean(gate.reason))}</system-out>"
-        inside = '<skipped message="the policy asks nothing here"/>' if gate.idle else inside
-        if not gate.passed:
-            failures += 1
-            inside = f'<failure type="gate" message={_attribute(gate.reason)}>{escape(clean(gate.reason))}</failure>'
-        rows.append(_testcase(f"{case.system}.gates", gate.title, 0.0, inside))
-    known = (("result", _result_of(case)), ("verdict", case.answers.told))
-    result = "".join(f'<property name="{name}" value={_attribute(value)}/>' for name, value in known)
-    counts = [len(rows), failures, 0, sum(gate.idle and gate.passed for gate in case.gates)]
-    head = f"{_numbers(counts)}>\n<properties>{result}</properties>\n"
-    return f'<testsuite name="gates" {head}{"".join(rows)}</testsuite>\n', counts
+def _of_gate(gate: Gate) -> _Row:
+    if not gate.passed:
+        return _Row("gates", gate.title, "failure", gate.reason, "gate")
+    if gate.idle:
+        return _Row("gates", gate.title, "skipped", "the policy asks nothing here")
+    return _Row("gates", gate.title, "", gate.reason)
 
 
-def _requirements_suite(case: Case) -> tuple[str, list[int]]:
-    rows, counts = [], [len(case.requirements), 0, 0, 0]
-    for r in case.requirements:
-        message = f"{r.stands}: {r.answer}"
-        inside = f"<system-out>{escape(clean(message))}</system-out>"  # for a passing one: how far it is shown
-        if r.level is Level.REFUTED and not case.strict:
-            counts[1] += 1
-            inside = f'<failure type="refuted" message={_attribute(message)}>{escape(clean(message))}</failure>'
-        elif not r.level.holds:
-            counts[3] += 1
-            inside = f"<skipped message={_attribute(message)}/>"
-        rows.append(_testcase(f"{case.system}.requirements", r.id, 0.0, inside))
-    return f'<testsuite name="requirements" {_numbers(counts)}>\n{"".join(rows)}</testsuite>\n', counts
+def _of_requirement(requirement: RequirementView, case: Case) -> _Row:
+    message = f"{requirement.stands}: {requirement.answer}"
+    if requirement.level is Level.REFUTED and not case.strict:
+        return _Row("requirements", requirement.id, "failure", message, "refuted")
+    return _Row("requirements", requirement.id, "" if requirement.level.holds else "skipped", message)
 
 
-def _suite(case: Case, node: str, views: Iterable[ObligationView]) -> tuple[str, list[int]]:
-    rows = []
-    counts = [0, 0, 0, 0]
-    for view in views:
-        message = f"{view.word}: {headline(view)}"
-        text = escape(clean(message))
-        inside = ""
-        if tone(view.status) == "bad" and not view.handled and not view.advice:
-            counts[1] += 1
-            inside = f"<failure type={_attribute(view.status)} message={_attribute(message)}>{text}</failure>"
-        elif view.status is Status.ERROR:
-            counts[2] += 1
-            inside = f'<error type="error" message={_attribute(message)}>{text}</error>'
-        elif not _passes(case, view):
-            counts[3] += 1
-            handled = f"{view.handled}; " if view.handled else ""
-            inside = f"<skipped message={_attribute(handled + message)}/>"
-        counts[0] += 1
-        seconds = sum(r.seconds for r in view.records)
-        o = view.obligation
-        rows.append(_testcase(f"{case.system}.{o.node}.{o.kind}", o.name, seconds, inside))
-    return f"<testsuite name={_attribute(node)} {_numbers(counts)}>\n{''.join(rows)}</testsuite>\n", counts
-
-
-def _testcase(group: str, name: str, seconds: float, inside: str) -> str:
-    head = f'<testcase classname={_attribute(group)} name={_attribute(name)} time="{seconds:.3f}"'
-    return f"{head}>{inside}</testcase>\n" if inside else f"{head}/>\n"
-
-
-def _numbers(counts: list[int]) -> str:
-    names = ("tests", "failures", "errors", "skipped")
-    return " ".join(f'{name}="{number}"' for name, number in zip(names, counts, strict=True))
-
-
-def _attribute(text: str) -> str:
-    return quoteattr(clean(str(text)).replace("\n", " ").replace("\r", " ").replace("\t", " "))
+def _of_claim(view: ObligationView, case: Case) -> _Row:
+    o, message = view.obligation, f"{view.word}: {headline(view)}"
+    row = _Row(f"{o.node}.{o.kind}", o.name, "", seconds=sum(r.seconds for r in view.records))
+    if _fails(view) and not view.advice:
+        return replace(row, outcome="failure", message=message, type=view.status.value)
+    if view.status is Status.ERROR:
+        return replace(row, outcome="error", message=message, type="error")
+    if not _passes(case, view):
+        return replace(row, outcome="skipped", message=f"{view.handled}; {message}" if view.handled else message)
+    return row
 
 
 # -- SARIF ----------------------------------------------------------------------------------------------------------
@@ -240,10 +208,10 @@ def _sarif_level(view: ObligationView, case: Case) -> tuple[str, str]:
 def render_attestation(case: Case) -> str:
     """in-toto statements (v1) with test-result predicates (v0.1): one for the system, then one for each node."""
     every = [_statement(case, "", list(case.obligations), _result_of(case))]
-    for node, own in by_node(case.obligations).items():
+    for node, own in of_nodes(case.obligations).items():
         views = [view for view in own if not view.advice]
         good = all(_passes(case, view) for view in views)
-        bad = any(tone(view.status) == "bad" and not view.handled for view in views)
+        bad = any(map(_fails, views))
         every.append(
             _statement(case, node, views, "FAILED" if bad else "PASSED" if good and not case.earlier else "WARNED")
         )
@@ -258,7 +226,7 @@ def _statement(case: Case, node: str, views: list[ObligationView], result: str) 
         subjects = {f"ledger/{case.system}": case.ledger_head}
     groups: dict[str, list[str]] = {"passedTests": [], "warnedTests": [], "failedTests": []}
     for view in views:
-        bad = tone(view.status) == "bad" and not view.handled and not view.advice
+        bad = _fails(view) and not view.advice
         groups["passedTests" if _passes(case, view) else "failedTests" if bad else "warnedTests"].append(view.id)
     return {
         "_type": "https://in-toto.io/Statement/v1",

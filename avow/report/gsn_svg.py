@@ -36,7 +36,7 @@ STYLE = (
 
 
 @dataclass(frozen=True, slots=True)
-class Box:
+class _Box:
     """One element: its head in bold, its text, a class for its kind, and the target of its link."""
 
     head: str
@@ -61,47 +61,47 @@ def draw(case: Case) -> str:
     return f"{head}<style>{STYLE}</style>{''.join(parts)}</svg>\n"
 
 
-def _modules(case: Case) -> Iterator[tuple[Box, str, Sequence[Box]]]:
+def _modules(case: Case) -> Iterator[tuple[_Box, str, Sequence[_Box]]]:
     for module in requirement_modules(case):
         r = module.requirement
         link = f"argument.html#{anchor('requirement:' + r.id)}"
         below = [
-            Box(title, words, "away", f"argument.html#{anchor('node:' + node)}") for node, title, words in module.away
+            _Box(title, words, "away", f"argument.html#{anchor('node:' + node)}") for node, title, words in module.away
         ]
         if module.conditions:
-            below.append(Box("Composition", module.conditions, "sol", "system.html#obligations"))
+            below.append(_Box("Composition", module.conditions, "sol", "system.html#obligations"))
         if module.supposes:
-            below.append(Box("assumes", ", ".join(module.supposes), "asm", "argument.html#assumptions"))
-        yield Box(f"{r.id}: {r.level}", r.words, f"goal {r.tone}", link), module.strategy, below
+            below.append(_Box("assumes", ", ".join(module.supposes), "asm", "argument.html#assumptions"))
+        yield _Box(f"{r.id}: {r.level}", r.words, f"goal {r.tone}", link), module.strategy, below
     bases = {basis.node: basis for basis in case.answers.bases}
     for node in node_modules(case):
         link = f"argument.html#{anchor('node:' + node.node.name)}"
-        root = Box(node.node.title, f"What {node.node.title} guarantees", "goal", link)
+        root = _Box(node.node.title, f"What {node.node.title} guarantees", "goal", link)
         if len(node.guarantees) > _MOST:
-            yield root, "", [Box(part, "", "goal", link) for part in bases[node.node.name].words.split(", ")]
+            yield root, "", [_Box(part, "", "goal", link) for part in bases[node.node.name].words.split(", ")]
             continue
         below = []
         for view in node.guarantees:
             place = f"argument.html#{anchor(view.id)}"
-            below.append(Box(view.standing.value, view.obligation.claim, f"goal {shade(view)}", place))
+            below.append(_Box(view.standing.value, view.obligation.claim, f"goal {shade(view)}", place))
         yield root, "", below
 
 
-def _panel(parts: list[str], y: int, root: Box, strategy: str, children: Sequence[Box]) -> int:
+def _panel(parts: list[str], y: int, root: _Box, strategy: str, children: Sequence[_Box]) -> int:
     """Draws one module from `y` on; returns where the next one begins."""
     left, wide = WIDTH // 6, WIDTH * 2 // 3
-    y = draw_box(parts, left, y, wide, root)
+    y = _draw_box(parts, left, y, wide, root)
     if strategy:
         y = _stem(parts, y)
-        y = draw_box(parts, left, y, wide, Box("", strategy, "str"))
+        y = _draw_box(parts, left, y, wide, _Box("", strategy, "str"))
     if children:
         y = _stem(parts, y)
         column = (WIDTH - GAP * (COLUMNS + 1)) // COLUMNS
         for at in range(0, len(children), COLUMNS):
             row = children[at : at + COLUMNS]
-            height = max(height_of(box, column) for box in row)
+            height = max(_height_of(box, column) for box in row)
             for place, box in enumerate(row):
-                draw_box(parts, GAP + place * (column + GAP), y, column, box, height)
+                _draw_box(parts, GAP + place * (column + GAP), y, column, box, height)
             y += height + GAP
     return y + 3 * GAP
 
@@ -111,10 +111,10 @@ def _stem(parts: list[str], y: int) -> int:
     return y + GAP
 
 
-def draw_box(parts: list[str], x: int, y: int, width: int, box: Box, height: int = 0) -> int:
+def _draw_box(parts: list[str], x: int, y: int, width: int, box: _Box, height: int = 0) -> int:
     """Appends a box, as high as its text needs or as `height` says; returns the y coordinate of its lower edge."""
     heads, lines = _texts(box, width)
-    height = height or height_of(box, width)
+    height = height or _height_of(box, width)
     radius = ' rx="12"' if "asm" in box.kind or "sol" in box.kind else ""
     body = [f'<rect class="b {box.kind}"{radius} x="{x}" y="{y}" width="{width}" height="{height}"/>']
     for at, line in enumerate((*heads, *lines)):
@@ -125,12 +125,12 @@ def draw_box(parts: list[str], x: int, y: int, width: int, box: Box, height: int
     return y + height
 
 
-def _texts(box: Box, width: int) -> tuple[list[str], list[str]]:
+def _texts(box: _Box, width: int) -> tuple[list[str], list[str]]:
     room = width - 2 * _PAD
     return wrap(box.head, room * 0.93), wrap(box.text, room)
 
 
-def height_of(box: Box, width: int) -> int:
+def _height_of(box: _Box, width: int) -> int:
     """The height in pixels that the box needs at that width."""
     return 2 * _PAD + _LINE * sum(map(len, _texts(box, width)))
 

@@ -13,6 +13,7 @@ from importlib import resources
 from itertools import zip_longest
 from pathlib import Path
 from typing import Any
+from xml.sax.saxutils import quoteattr
 
 from jinja2 import Environment, PackageLoader, StrictUndefined, __version__
 from jinja2.bccache import Bucket, BytecodeCache
@@ -33,7 +34,7 @@ from avow.base.tuning.bounds import SUPPORT_STEPS
 from avow.base.tuning.shown import FINDING_CHARACTERS, GUARANTEE_ROWS, OBLIGATIONS_IN_FULL, ROWS_UNFOLDED
 from avow.evidence.obligation import SYSTEM_LEVEL, Kind
 from avow.evidence.status import Status, weigh
-from avow.report import example, exchange, source, wording
+from avow.report import example, source, wording
 from avow.report.maps import draw_map
 from avow.report.wording import history
 
@@ -103,10 +104,13 @@ def environment() -> Environment:
         "source_lines": source.lines_of,
         "math": _math,
         "count": count,
+        "clean": wording.clean,
+        "q": quoted,
         "mutation": wording.mutation,
         "details_text": wording.details_text,
         "outline": wording.outline,
         "NOT_SHOWN": wording.NOT_SHOWN,
+        "NO_HAZARD": wording.NO_HAZARD,
         "not_shown": wording.not_shown,
         "overhead": wording.overhead,
         "protocol": wording.protocol,
@@ -119,6 +123,11 @@ def environment() -> Environment:
         "weigh": weigh,
     }
     return found
+
+
+def quoted(text: str) -> Markup:
+    """The text as an XML attribute's value, with its quotation marks."""
+    return Markup(quoteattr(wording.clean(text)))
 
 
 def fill(template: str, **given: Any) -> str:
@@ -139,7 +148,7 @@ def render_page(case: Case, json_digest: str = "") -> str:
         total=len(case.obligations),
         counts=_counts(case.obligations),
         matrix=matrix if len(case.guarantees) <= GUARANTEE_ROWS else [],
-        graph=svg_image(case.graph_svg),
+        graph=_svg_image(case.graph_svg),
         open_items=listed,
         resting=resting(case),
         open_line=wording.open_line(case),
@@ -190,7 +199,7 @@ def known_pages(case: Case) -> dict[str, str]:
 
 def by_node(case: Case) -> dict[str, list[ObligationView]]:
     """Every obligation, in reading order: the nodes in the contract's order, then the whole system."""
-    return exchange.by_node(sorted(case.obligations, key=_reading_order(case)))
+    return wording.of_nodes(sorted(case.obligations, key=_reading_order(case)))
 
 
 _SUBSCRIPT = re.compile(r"(?<!\w)([𝒜𝒢io])_([A-Za-z0-9_]+)")
@@ -352,7 +361,7 @@ def _cell(view: ObligationView, method: str) -> Status | None:
     return roll_up((item.entry.evidence for item in mine if item.counts), outdated=bool(mine))
 
 
-def svg_image(text: str) -> str:
+def _svg_image(text: str) -> str:
     """A picture as the source of an image: no script in it can run. Empty if there is no picture."""
     if not text:
         return ""

@@ -7,7 +7,6 @@ identifier is a digest of what it names, so a tool that imports a later export u
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from xml.sax.saxutils import quoteattr
 
 from markupsafe import Markup
 
@@ -15,7 +14,6 @@ from avow.assurance.model import Case
 from avow.assurance.traceability import Row
 from avow.base.files import sha256
 from avow.report.page import fill
-from avow.report.wording import clean
 
 TEXT = "ReqIF.Text"
 KINDS: Mapping[str, tuple[str, ...]] = {
@@ -87,8 +85,6 @@ def render_reqif(case: Case, rows: Sequence[Row]) -> str:
         below=below,
         id=lambda *parts: Markup(f'"{identifier(*parts)}"'),
         ref=lambda *parts: Markup(identifier(*parts)),
-        q=lambda text: Markup(quoteattr(clean(text))),  # quoted as XML, with the quotation marks
-        clean=clean,
         when=f"{case.today}T00:00:00Z",
     )
 

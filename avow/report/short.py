@@ -1,13 +1,11 @@
-"""The five answers in few words: for a terminal of 24 lines, as a comment of 150 words, and at the head of the
-Markdown."""
+"""The five answers in few words: for a terminal of 24 lines, and as a comment of 150 words."""
 
 from __future__ import annotations
 
 import re
 import textwrap
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
-from avow.assurance.answers import ABOUT
 from avow.assurance.model import Case, RequirementView
 from avow.base.plain import listed
 from avow.report.wording import clean, weakest
@@ -30,7 +28,7 @@ def terminal_lines(case: Case) -> list[str]:
     shown = a.based_on[:4]
     more = f"; and {len(a.bases) - len(shown)} more nodes" if len(a.bases) > len(shown) else ""
     lines += ["2 Based on", *_cut_lines("; ".join(f"{b.title} {b.words}" for b in shown) + more, 2)]
-    lines += ["3 Weakest evidence", *_cut_lines(_weakest_words(case), 3)]
+    lines += ["3 Weakest evidence", *_cut_lines(weakest_words(case), 3)]
     lines += [f"4 Assumed{f' ({a.owned} with an owner and an end)' if a.owned else ': nothing'}"]
     lines += [_cut(f"  {line.about}: {line.says}") for line in a.supposed]
     head = f" {a.changed_against[:1].lower()}{a.changed_against[1:]}"
@@ -58,7 +56,7 @@ def comment(case: Case) -> str:
         escaped(a.beside),
         escaped(a.changed_against) or "No report has been signed yet.",
         "\n".join(f"- {mark} {escaped(_few(words))}" for mark, words in a.changed if mark),
-        f"Weakest evidence: {escaped(_few(_weakest_words(case)))}",
+        f"Weakest evidence: {escaped(_few(weakest_words(case)))}",
         "Hazards: " + (listed([f"{escaped(h.hazard.id)} mitigation {h.level}" for h in case.hazards], 6) or "none"),
         "<details><summary>Requirements and assumptions</summary>",
         "\n".join(
@@ -70,47 +68,13 @@ def comment(case: Case) -> str:
     return "\n\n".join(line for line in lines if line) + "\n"
 
 
-def markdown_head(case: Case) -> Iterator[str]:
-    """The five answers as paragraphs of Markdown."""
-    a = case.answers
-    yield f"**{a.tone.mark} {escaped(a.verdict)}**"
-    yield escaped(f"{a.beside} · {a.signed}")
-    yield "## 1 What is claimed?"
-    rows = [
-        f"| **{escaped(r.id)}** {escaped(_one(r))} | {r.tone.mark} {r.stands} "
-        f"| {escaped(weakest(r))} | {len(r.supposes)} |"
-        for r in case.requirements
-    ]
-    head = "| requirement | how it stands | weakest evidence | assumptions |\n| --- | --- | --- | --- |\n"
-    yield head + "\n".join(rows) if rows else "No requirement is named."
-    yield escaped(a.legend)
-    yield "## 2 What is it based on?"
-    yield "\n".join(f"- {escaped(b.title)}: {escaped(b.words)}" for b in a.bases) or "Nothing."
-    if a.objects:
-        yield escaped(f"{a.objects}.")
-    yield "## 3 What is the weakest evidence?"
-    yield escaped(_weakest_words(case))
-    yield "## 4 What is assumed, not shown?"
-    owners = f": {escaped(a.owners)}" if a.owners else ""
-    owned = f"{a.owned} with an owner and an end{owners}.\n\n" if a.owned else ""
-    yield owned + (
-        "\n".join(f"- {s.number} ({ABOUT[s.sort]}) {escaped(s.words)}; {escaped(s.term)}" for s in case.assumptions)
-        or "Nothing."
-    )
-    yield "## 5 What changed since the last signed report?"
-    if a.changed_against:
-        yield escaped(a.changed_against)
-    yield "\n".join(f"- {mark} {escaped(words)}" if mark else escaped(words) for mark, words in a.changed)
-    yield "## Deficits"
-    yield "\n".join(f"- {w.count} {escaped(w.words)}. {escaped(w.why)}" for w in case.deficits) or "None."
-
-
 def _standing(r: RequirementView) -> str:
     """For a short line: the rate, if there is one, else the weakest evidence."""
     return r.stands if r.rate and r.rate.bound else f"{r.level}, {weakest(r)}"
 
 
-def _weakest_words(case: Case) -> str:
+def weakest_words(case: Case) -> str:
+    """The weakest evidence of the case, or what refutes it, in a sentence or two."""
     a = case.answers
     if a.refuted:
         return a.refuted

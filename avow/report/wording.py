@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import re
 import shlex
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 from urllib.parse import quote
 
@@ -135,6 +135,14 @@ def _text(evidence: Evidence, key: str) -> str:
         case str(text):
             return " ".join(text.split())
     return ""
+
+
+def of_nodes(views: Iterable[ObligationView]) -> dict[str, list[ObligationView]]:
+    """The claims of each node, in the order given."""
+    found: dict[str, list[ObligationView]] = {}
+    for view in views:
+        found.setdefault(view.obligation.node, []).append(view)
+    return found
 
 
 def where(view: ObligationView) -> str:

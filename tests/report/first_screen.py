@@ -9,8 +9,9 @@ from typing import Any
 from avow.assurance.model import Case
 from avow.base.plain import identifiers
 from avow.report.answers_page import render_argument, worded
+from avow.report.markdown import render_markdown
 from avow.report.pdf import _data as pdf_data
-from avow.report.short import LINES, WIDTH, WORDS, comment, markdown_head, terminal_lines
+from avow.report.short import LINES, WIDTH, WORDS, comment, terminal_lines
 from avow.report.wording import clean
 from report.chromium import dark, frames_of, measure
 
@@ -58,7 +59,7 @@ def counts(found: Case, page: str) -> list[str]:
     a, told = found.answers, []
     pdf = pdf_data(found)["first"]
     plain = re.sub(r"\s+", " ", re.sub(r"<[^>]*>", "", page))
-    markdown = "\n".join(markdown_head(found)).replace("\\", "")
+    markdown = render_markdown(found).replace("\\", "")
     terminal = terminal_lines(found)
     for name, text in (
         ("page", plain),

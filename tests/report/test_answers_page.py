@@ -20,7 +20,7 @@ from avow.evidence.obligation import Kind
 from avow.report.answers_page import render_answers, render_argument, worded
 from avow.report.markdown import render_markdown
 from avow.report.pdf import _data as pdf_data
-from avow.report.short import comment, markdown_head, terminal_lines
+from avow.report.short import comment, terminal_lines
 from avow.report.wording import NO_HAZARD
 from avow.system.plan import Hazard, Requirement, Statement
 from report.chromium import measure
@@ -278,4 +278,4 @@ def test_what_evidence_supposes_is_told_whether_or_not_a_requirement_needs_it(re
     assert "inputs are finite" in str(pdf_data(found))
     (line,) = [line for line in terminal_lines(found) if line.startswith("4 Assumed")]
     assert line == f"4 Assumed ({found.answers.owned} with an owner and an end)"
-    assert "Nothing." not in "\n".join(markdown_head(found)).split("## 4")[1].split("## 5")[0]
+    assert "Nothing." not in render_markdown(found).split("## 4")[1].split("## 5")[0]

@@ -95,7 +95,7 @@ def made(name: str) -> tuple[str, bytes]:
 
 def changed(page: str) -> Iterator[tuple[str, str]]:
     """Each number that a reader sees, one greater than it is: (text around it, the page). Left out: the digest of
-    what is signed, which `avow sign` computes, captions of bow-ties, which may name any hazard, and names of nodes."""
+    what is signed, which `avow sign` computes, and names of nodes."""
     told = blocks(page)
     body = page.index("<body")
     for text in re.finditer(r">([^<>]+)<", page[body:]):
@@ -104,7 +104,7 @@ def changed(page: str) -> Iterator[tuple[str, str]]:
             digits = number.group()
             other = page[:at] + digits[:-1] + str((int(digits[-1]) + 1) % 10) + page[end:]
             entity, node = page[:at].endswith("&#"), page[:at].endswith("arm")
-            left_out = re.match(r"[^<]*(…</code>| as a bow-tie)", page[at:])
+            left_out = re.match(r"[^<]*…</code>", page[at:])
             if not (entity or node or left_out) and blocks(other) != told:
                 yield page[at - 30 : end + 30], other
 

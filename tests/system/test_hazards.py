@@ -16,7 +16,7 @@ from avow.assurance.traceability import trace
 from avow.base.diagnostics import Rejected
 from avow.base.verdict import Object, Verdict
 from avow.evidence.record import Evidence
-from avow.report.bowtie import bowtie
+from avow.report.answers_page import render_argument
 from avow.system.load import load_system
 from avow.system.plan import Hazard, Requirement, System
 
@@ -135,9 +135,13 @@ def test_a_bow_tie_has_every_part_and_text_is_data() -> None:
     hazard = Hazard(
         "H1", "It <burns>", "critical", "remote", causes=("a & b",), consequences=("loss",), mitigated_by=("n",)
     )
-    picture = bowtie(case_of(hazard, records=(PROOF,)).hazards[0])
+    picture = (
+        render_argument(case_of(hazard, records=(PROOF,)))
+        .partition("Hazards as bow-ties")[2]
+        .partition("</section>")[0]
+    )
     assert all(part in picture for part in ("&lt;burns&gt;", "a &amp; b", "loss", "n: shown of models", "critical"))
-    assert "no mitigation" in bowtie(case_of(Hazard("H2", "It burns", "critical")).hazards[0])
+    assert "no mitigation</div>" in render_argument(case_of(Hazard("H2", "It burns", "critical")))
 
 
 def test_the_trace_leads_from_source_and_hazard_to_the_command_that_asks_again() -> None:
