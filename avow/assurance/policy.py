@@ -110,15 +110,6 @@ class Policy:
         return demands.get(criticality, demands[CRITICALITIES[0]])
 
 
-@dataclass(frozen=True, slots=True)
-class Technique:
-    """A row of the guidance table: a technique, its verdict here, and (profile, recommendation) pairs."""
-
-    name: str
-    verdict: str
-    levels: tuple[tuple[str, str], ...]
-
-
 def profile(name: str) -> Policy:
     """A ready policy. Raises KeyError."""
     return _data()[0][name]
@@ -131,11 +122,6 @@ def profile_names() -> tuple[str, ...]:
 def costs() -> Mapping[str, int]:
     """The cost of a method by the verdict that it can give: an order, not an amount."""
     return _data()[1]
-
-
-def techniques() -> tuple[Technique, ...]:
-    """The guidance table: techniques recommended by level."""
-    return _data()[2]
 
 
 def read_policy(located: Located) -> Policy:
@@ -328,7 +314,7 @@ def _unknown(
 
 
 @cache
-def _data() -> tuple[dict[str, Policy], dict[str, int], tuple[Technique, ...]]:
+def _data() -> tuple[dict[str, Policy], dict[str, int]]:
     data = packaged("avow.assurance", "profiles.yaml")
     faults: list[Diagnostic] = []
     policies = {}
@@ -349,9 +335,4 @@ def _data() -> tuple[dict[str, Policy], dict[str, int], tuple[Technique, ...]]:
         )
     if faults:
         raise Rejected(*faults)
-    levels = ("sil1", "sil2", "sil3", "sil4")
-    table = tuple(
-        Technique(row["name"], row["verdict"], tuple((level, row[level]) for level in levels))
-        for row in data["techniques"]
-    )
-    return policies, data["cost"], table
+    return policies, data["cost"]

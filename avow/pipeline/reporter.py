@@ -100,7 +100,7 @@ class PipelineReporter(ConsoleReporter):  # type: ignore[misc]
         self.runtime_errors.append(msg)
 
     def complete_run(self) -> None:
-        from avow.pipeline.summary import append_job_summary, print_summary, results_json
+        from avow.pipeline.summary import print_summary, results_json
 
         results = self._state.results
         if sys.exc_info()[0] is None:
@@ -113,7 +113,6 @@ class PipelineReporter(ConsoleReporter):  # type: ignore[misc]
             {name for f in self.failures if (name := system_of(f["task"].name))} - set(self._state.results.finished)
         )
         print_summary(results.all, broken, self._earlier(), self._done, time.monotonic() - self._start, self.outstream)
-        append_job_summary(results.all, broken)
         if self._state.answer:
             self._state.answer.write(results_json(results.all, broken, self._earlier(), results.exit_code))
         if sys.exc_info()[0] is None and not self._seen.issuperset(self._selected):

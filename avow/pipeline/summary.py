@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import IO
@@ -104,37 +103,3 @@ def _few(reason: str) -> str:
 
 def _gates(result: Result) -> str:
     return "every gate passes" if result.exit_code == 0 else "a gate fails"
-
-
-def append_job_summary(results: Sequence[Result], broken: Sequence[str]) -> None:
-    """The same as Markdown at the end of the file that GITHUB_STEP_SUMMARY names, as CI services show it."""
-    path = os.environ.get("GITHUB_STEP_SUMMARY")
-    if path and (results or broken):
-        with Path(path).open("a", encoding="utf-8") as file:
-            file.write(job_summary(results, broken))
-
-
-def job_summary(results: Sequence[Result], broken: Sequence[str]) -> str:
-    """A table over all systems, and what fails, in GitHub's Markdown."""
-    shown = [word for word in (*GOOD, *BAD) if any(r.counts.get(word) for r in results)]
-    lines = [
-        "## Assurance",
-        "",
-        f"| system | {' | '.join([*shown, 'verdict'])} |",
-        "|---|" + "--:|" * len(shown) + "---|",
-    ]
-    for r in sorted(results, key=lambda r: r.system):
-        mark = "❌" if r.exit_code else "✅" if r.tone in ("", "green") else "⚠️"
-        verdict = f"{mark} {_inline(r.verdict) or _gates(r)}"
-        lines.append(f"| {r.system} | {' | '.join([*(str(r.counts.get(w, '')) for w in shown), verdict])} |")
-    lines += [f"| {name} | {'| ' * len(shown)}❌ not done |" for name in broken]
-    failing = [(r.system, title, reason) for r in results for title, passed, reason in r.gates if not passed]
-    lines += ["", *(f"- **{_inline(system)}**: {_inline(title)}: {_inline(why)}" for system, title, why in failing)]
-    lines += [f"- {_inline(file)}: {_inline(why)}" for file, why in _left_out(results)]
-    return "\n".join(lines) + "\n"
-
-
-def _inline(text: str) -> str:
-    """The text on one line, escaped for Markdown and HTML."""
-    escaped = "".join(f"\\{c}" if c in "\\`*_[]<>|#" else c for c in " ".join(text.split()))
-    return escaped.replace("&", "&amp;")

@@ -1,14 +1,14 @@
-"""The meaning of a report's names and marks, in a few lines each: requirements, assumptions, nodes, gates, deficits,
-derivations and words; elements of the argument, digests, files, runs, codes, ports, methods. `avow.report.terminal`
-explains obligations."""
+"""The meaning of a report's names and marks, in a few lines each. `avow.report.terminal` explains obligations."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator
+from itertools import islice
 
 from avow.assurance import answers
 from avow.assurance.changes import baseline_of
+from avow.assurance.codec import to_json
 from avow.assurance.model import Case
 from avow.assurance.naming import short
 from avow.base.files import sha256
@@ -22,129 +22,117 @@ from avow.report.goals import argument
 from avow.report.modules import requirement_modules
 from avow.report.wording import MEANINGS
 
-
-def explained(case: Case, name: str) -> Iterator[tuple[str, list[str]]]:
-    """(heading, lines) of everything in the case that has the name, except obligations."""
-    for module in requirement_modules(case):
-        r = module.requirement
-        if r.id == name:
-            lines = [r.words, module.because]
-            lines += [f"formula: {r.formal}"] if r.formal else []
-            weakest = r.weakest_evidence
-            lines += [f"weakest evidence: {weakest.title}, {weakest.words} ({short(weakest.claim)})"] if weakest else []
-            lines += [f"rests on {title}: {words}" for _, title, words in module.away]
-            lines += [f"composition: {module.conditions}"] if module.conditions else []
-            lines += [f"assumes {', '.join(module.supposes)}"] if module.supposes else []
-            lines += [f"not shown, because of: {listed([short(n) for n in module.failing])}"] if module.failing else []
-            yield f"requirement {r.id}", lines
-    for s in case.assumptions:
-        if name in (s.number, s.key):
-            lines = [s.words, full_reason(s), s.term, f"needed by {listed(s.needing)}", f"from {listed(s.where)}"]
-            yield f"assumption {s.number} ({s.sort}), {s.key}", [line for line in lines if line]
-    for node in case.nodes:
-        if name in (node.name, node.title, f"{case.system}/{node.name}"):
-            basis = next((b for b in case.answers.bases if b.node == node.name), None)
-            lines = [f"criticality {node.criticality}", f"guarantees: {basis.words if basis else 'none'}"]
-            lines += [f"assumes {clause}: {said}" for clause, said in node.assumptions]
-            lines += [f"guarantees {clause}: {said}" for clause, said in node.guarantees]
-            lines += [f"method {method} ({backend})" for method, backend in node.methods]
-            yield f"node {node.name}", lines
-    for gate in case.gates:
-        if name in (gate.id, gate.title):
-            lines = [f"{gate.state}: {gate.reason}", *(f"next: {s.text}" for s in gate.suggestions[:3])]
-            yield f"gate {gate.id}: {gate.title}", lines
-    for w in case.deficits:
-        if name in (w.key, w.words):
-            yield f"deficit {w.key}: {w.count} {w.words}", [w.why, listed([short(claim) for claim in w.claims], 20)]
-    for d in case.derivations:
-        if d.derivation.name == name:
-            lines = [*d.derivation.text.splitlines(), f"{d.status.value}: {d.derivation.conclusion}"]
-            yield f"derivation {name} (rule {d.derivation.rule})", lines
-    words = [(word, meaning) for word, meaning in WORDS if name.casefold() in word.split(", ")]
-    for word, meaning in words:
-        yield f"the word {word}", [meaning]
-    yield from (told for told in identified(case, name) if not (words and told[0].startswith("the word ")))
-
-
 Explanation = tuple[str, list[str]]
+"""A heading, and lines."""
 
-_DIGEST = re.compile(r"[0-9a-f]{12,64}\Z")
+_MARK = re.compile(r"[0-9a-f]{12,64}\Z|.*[./]")
+"""A digest, or the name of a file."""
 _CODE = re.compile(r"[A-Z]{2,9}[0-9]{3}\Z")
-_SHAPES = {"G": "goal", "S": "strategy", "Sn": "solution", "C": "context", "A": "assumption", "J": "justification"}
-"""GSN's kinds of element, by the letters before their numbers."""
-_PLACE = re.compile(r"(?P<path>[^:]+):(?P<line>[0-9]+)\Z")
 
 
-def identified(case: Case, name: str) -> Iterator[Explanation]:
-    """(heading, lines) of everything in the case that has the mark."""
-    if _DIGEST.match(name):
-        yield from _of_digest(case, name)
+def explained(case: Case, name: str) -> Iterator[Explanation]:
+    """Everything in the case that has the name, except obligations; for a digest or a file where report.json has it."""
+    found = [(heading, lines) for heading, names, lines in _named(case) if name in names]
     if _CODE.match(name):
-        yield from _of_code(name)
-    yield from _of_argument(case, name)
-    yield from _of_files(case, name)
-    yield from _of_contract(case, name)
-    yield from _of_methods(case, name)
-    if name == case.run.id:
-        yield f"run {name}", [f"begun {case.run.started}, {case.run.seconds:g} s, Avow {case.run.avow_version}"]
-    if name == case.system:
-        yield f"system {name}", [case.title, case.answers.told, case.answers.beside]
-    words = {s.value: MEANINGS[s] for s in Status} | {str(level): told for level, told in answers.MEANINGS.items()}
-    if name in words:
-        yield f"the word {name}", [words[name]]
+        found += _of_code(name)
+    if _MARK.match(name) and not found:
+        found += [_of_record(entry) for entry in _entries(case) if entry.hash.startswith(name)]
+        if not found and (places := list(islice(_places(to_json(case), name), RECORDS))):
+            found.append((f"{name} in report.json", places))
+        if sha256(render_json(case)) == name:
+            found.append(("report.json", ["the digest of this report's data, from which every format is rendered"]))
+        if baseline_of(case).content.startswith(name):
+            found.append(("what is signed", ["the digest of everything that this case claims (`avow sign`)"]))
+    for heading, lines in found:
+        yield heading, [line for line in lines if line]
 
 
-def entries(case: Case) -> Iterator[Entry]:
+def left_out(case: Case, records: Iterable[Entry], name: str) -> Iterator[Explanation]:
+    """The ledger's records with that hash that the report does not quote: only the ledger has them."""
+    if len(name) < 12:
+        return
+    kept = {entry.hash for entry in _entries(case)}
+    why = "left out of the report: what it says is of an earlier state, or said again since"
+    for entry in records:
+        if entry.hash.startswith(name) and entry.hash not in kept:
+            heading, lines = _of_record(entry)
+            yield heading, [*lines, why]
+
+
+def _named(case: Case) -> Iterator[tuple[str, tuple[str, ...], list[str]]]:
+    """(heading, its names, lines) of everything that has a name of its own."""
+    yield f"system {case.system}", (case.system,), [case.title, case.answers.told, case.answers.beside]
+    ran = f"begun {case.run.started}, {case.run.seconds:g} s, Avow {case.run.avow_version}"
+    yield f"run {case.run.id}", (case.run.id,), [ran]
+    for module in requirement_modules(case):
+        r, weakest = module.requirement, module.requirement.weakest_evidence
+        lines = [r.words, module.because, r.formal and f"formula: {r.formal}"]
+        lines += [f"weakest evidence: {weakest.title}, {weakest.words} ({short(weakest.claim)})"] if weakest else []
+        lines += [f"rests on {title}: {words}" for _, title, words in module.away]
+        lines += [module.conditions and f"composition: {module.conditions}"]
+        lines += [f"assumes {', '.join(module.supposes)}"] if module.supposes else []
+        lines += [f"not shown, because of: {listed([short(n) for n in module.failing])}"] if module.failing else []
+        yield f"requirement {r.id}", (r.id,), lines
+    for s in case.assumptions:
+        lines = [s.words, full_reason(s), s.term, f"needed by {listed(s.needing)}", f"from {listed(s.where)}"]
+        yield f"assumption {s.number} ({s.sort}), {s.key}", (s.number, s.key), lines
+    for node in case.nodes:
+        basis = next((b for b in case.answers.bases if b.node == node.name), None)
+        lines = [f"criticality {node.criticality}", f"guarantees: {basis.words if basis else 'none'}"]
+        lines += [f"assumes {clause}: {said}" for clause, said in node.assumptions]
+        lines += [f"guarantees {clause}: {said}" for clause, said in node.guarantees]
+        lines += [f"method {method} ({backend})" for method, backend in node.methods]
+        yield f"node {node.name}", (node.name, node.title, f"{case.system}/{node.name}"), lines
+    for gate in case.gates:
+        lines = [f"{gate.state}: {gate.reason}", *(f"next: {s.text}" for s in gate.suggestions[:3])]
+        yield f"gate {gate.id}: {gate.title}", (gate.id, gate.title), lines
+    for w in case.deficits:
+        claims = listed([short(claim) for claim in w.claims], 20)
+        yield f"deficit {w.key}: {w.count} {w.words}", (w.key, w.words), [w.why, claims]
+    for d in case.derivations:
+        lines = [*d.derivation.text.splitlines(), f"{d.status.value}: {d.derivation.conclusion}"]
+        yield f"derivation {d.derivation.name} (rule {d.derivation.rule})", (d.derivation.name,), lines
+    for given in case.environment:
+        lines = [f"assumed: {given.assume}" if given.assume else "nothing is assumed of it", given.because]
+        yield f"{given.port}, from the environment", (given.port,), lines
+    for m in case.methods:
+        state = "" if m.available else f"its tool is missing: {m.install}"
+        lines = [m.title, f"at best {Status(m.strength).value}: {m.green_means}", state]
+        yield f"method {m.name}", (m.name,), lines
+    for argued in argument(case):
+        for e in argued.elements:
+            lines = [e.label, e.text, *e.text_of_defeaters()]
+            yield f"{e.sort.name.lower()} {e.name} of the argument, {argued.name}", (e.name,), lines
+    meanings = {s.value: MEANINGS[s] for s in Status} | {level.value: told for level, told in answers.MEANINGS.items()}
+    meanings |= dict(WORDS)
+    for word, meaning in meanings.items():
+        yield f"the word {word}", (word, *word.split(", ")), [meaning]
+
+
+def _places(value: object, name: str, path: str = "") -> Iterator[str]:
+    """Where plain data has a text that is, or begins with, the name."""
+    if isinstance(value, dict):
+        for key, item in value.items():
+            if key == name:
+                yield f"{path}.{key}: {item}"[1:]
+            if key != "previous":  # the chain of the ledger
+                yield from _places(item, name, f"{path}.{key}")
+    elif isinstance(value, list):
+        for at, item in enumerate(value):
+            yield from _places(item, name, f"{path}[{at}]")
+    elif isinstance(value, str) and (value == name or (len(name) >= 12 and value.startswith(name))):
+        yield f"{path}: {value}"[1:]
+
+
+def _entries(case: Case) -> Iterator[Entry]:
     yield from (item.entry for view in case.obligations for item in view.evidence)
     yield from case.orphans
 
 
-def left_out(case: Case, records: Iterable[Entry], name: str) -> Iterator[Explanation]:
-    """(heading, lines) of the ledger's records with that hash that the report does not quote: only the ledger has
-    them."""
-    if _DIGEST.match(name):
-        kept = {entry.hash for entry in entries(case)}
-        for entry in records:
-            if entry.hash.startswith(name) and entry.hash not in kept:
-                heading, lines = _of_record(entry)
-                yield (
-                    heading,
-                    [*lines, "left out of the report: what it says is of an earlier state, or said again since"],
-                )
-
-
 def _of_record(entry: Entry) -> Explanation:
-    return f"record {entry.number + 1} of the ledger", [_line(entry), entry.evidence.summary]
-
-
-def _line(entry: Entry) -> str:
-    e = entry.evidence
-    return f"record {entry.number + 1}: {short(e.obligation)} {Status(e.verdict).value} by {e.method}, {e.started[:16]}"
-
-
-def _of_digest(case: Case, name: str) -> Iterator[Explanation]:
-    yield from (_of_record(entry) for entry in entries(case) if entry.hash.startswith(name))
-    for view in case.obligations:
-        if view.obligation.digest.startswith(name):
-            yield f"the meaning of {short(view.id)}", [view.obligation.formula or view.obligation.claim]
-    for proof in case.proofs:
-        if proof.key and proof.key.startswith(name):
-            yield f"the certificate of {short(proof.obligation)}", [f"{proof.grade}: what it rests on has this key"]
-    for part in case.trusted:
-        if part.which.startswith(name):
-            yield f"trusted: {part.what}", ["the digest of this part, on which proofs by certificate rest"]
-    if len(name) == 64 and sha256(render_json(case)) == name:
-        yield "report.json", ["the digest of this report's data, from which every other format is rendered"]
-    if case.ledger_head.startswith(name):
-        yield "the head of the ledger", ["the digest of its last record, which is chained to all before it"]
-    if baseline_of(case).content.startswith(name):
-        yield "what is signed", ["the digest of everything that this case claims (`avow sign`)"]
-    paths = {path for path, mark in case.digests if mark.startswith(name)}
-    for entry in entries(case):
-        known = {**entry.evidence.inputs, **entry.evidence.outputs}
-        paths |= {path for path, mark in known.items() if mark.startswith(name)}
-    for path in sorted(paths):
-        yield f"the content of {path}", list(_read_by(case, path))
+    e, name = entry.evidence, f"record {entry.number + 1}"
+    line = f"{name}: {short(e.obligation)} {Status(e.verdict).value} by {e.method}, {e.started[:16]}"
+    return f"{name} of the ledger", [line, e.summary]
 
 
 def _of_code(name: str) -> Iterator[Explanation]:
@@ -152,58 +140,4 @@ def _of_code(name: str) -> Iterator[Explanation]:
 
     known = every_code().get(name)
     if known is not None:
-        yield f"{name}: {known.title}", [line for line in (known.explanation, known.remedy) if line]
-
-
-def _of_argument(case: Case, name: str) -> Iterator[Explanation]:
-    kind = _SHAPES.get(name.rstrip("0123456789"))
-    for module in argument(case) if kind is not None else ():
-        for element in module.elements:
-            if element.name == name:
-                lines = [element.label, element.text, *element.text_of_defeaters()]
-                yield f"{kind} {name} of the argument, {module.name}", [line for line in lines if line]
-
-
-def _of_files(case: Case, name: str) -> Iterator[Explanation]:
-    found = _PLACE.match(name)
-    path = found["path"] if found else name
-    read = list(_read_by(case, path))
-    if read or path in {path for path, _ in case.digests}:
-        yield f"the file {path}", read or ["of contract and plan: the case was made of it"]
-
-
-def _read_by(case: Case, path: str) -> Iterator[str]:
-    inside = path.rpartition("/contracts/")[2]
-    for how, found in (
-        ("read", [e for e in entries(case) if path in e.evidence.inputs or inside in e.evidence.inputs]),
-        ("left", [e for e in entries(case) if path in e.evidence.outputs]),
-    ):
-        for entry in found[:RECORDS]:
-            yield f"{how} for {_line(entry)}"
-        if len(found) > RECORDS:
-            yield f"{how} for {len(found) - RECORDS} more records"
-
-
-def _of_contract(case: Case, name: str) -> Iterator[Explanation]:
-    for node in case.nodes:
-        for clause, said in node.assumptions:
-            if name in (f"{node.name}.{clause}", clause):
-                yield f"assumption {clause} of {node.name}", [said]
-        for clause, said in node.guarantees:
-            if name == clause:
-                yield f"guarantee {clause} of {node.name}", [said]
-    for given in case.environment:
-        if name in (given.port, given.port.partition(".")[2]):
-            lines = [f"assumed: {given.assume}" if given.assume else "nothing is assumed of it", given.because]
-            yield f"{given.port}, from the environment", [line for line in lines if line]
-
-
-def _of_methods(case: Case, name: str) -> Iterator[Explanation]:
-    for method in case.methods:
-        if method.name == name:
-            state = "" if method.available else f"its tool is missing: {method.install}"
-            lines = [method.title, f"at best {Status(method.strength).value}: {method.green_means}", state]
-            yield f"method {name}", [line for line in lines if line]
-    for tool in case.tools:
-        if tool.name == name:
-            yield f"tool {name}", [tool.version or f"missing: {tool.install}"]
+        yield f"{name}: {known.title}", [known.explanation or "", known.remedy or ""]

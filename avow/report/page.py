@@ -21,8 +21,7 @@ from markupsafe import Markup, escape
 
 from avow.assurance.answers import MEANINGS, Tone
 from avow.assurance.model import Case, ObligationView, OpenItem
-from avow.assurance.naming import derivation_claim, requirement_claim, short
-from avow.assurance.policy import techniques
+from avow.assurance.naming import short
 from avow.assurance.remarks import REMARK
 from avow.assurance.traceability import Row
 from avow.backend_kit.timeline import in_words, picture, timelines
@@ -30,7 +29,6 @@ from avow.base.files import sha256, write
 from avow.base.notes import cache_folder, sealed, unsealed
 from avow.base.plain import count
 from avow.base.remembered import by_identity
-from avow.base.tuning.bounds import SUPPORT_STEPS
 from avow.base.tuning.shown import FINDING_CHARACTERS, GUARANTEE_ROWS, OBLIGATIONS_IN_FULL, ROWS_UNFOLDED
 from avow.evidence.obligation import SYSTEM_LEVEL, Kind
 from avow.evidence.status import Status, weigh
@@ -150,7 +148,6 @@ def render_page(case: Case, json_digest: str = "") -> str:
         matrix=matrix if len(case.guarantees) <= GUARANTEE_ROWS else [],
         graph=_svg_image(case.graph_svg),
         open_items=listed,
-        resting=resting(case),
         open_line=wording.open_line(case),
         remark_line=wording.remark_line(case),
         open_kinds=list(Counter(item.kind for item in listed).items()),
@@ -161,7 +158,6 @@ def render_page(case: Case, json_digest: str = "") -> str:
         justified=_justified(case),
         used_methods=_used_methods(case),
         statuses=[s for s in Status if any(view.standing is s for view in case.obligations)],
-        levels=techniques() if case.policy.name.startswith("sil") else (),
         json_digest=json_digest,
         kinds=[kind for kind in KINDS if any(view.obligation.kind is kind for view in case.obligations)],
         open_at_once=ROWS_UNFOLDED,
@@ -375,25 +371,3 @@ def _justified(case: Case) -> list[tuple[ObligationView, Any]]:
         for record in view.records
         if weigh(record).support is Status.JUSTIFIED
     ]
-
-
-def resting(case: Case) -> dict[str, _Stands]:
-    """How the claims stand that each supported requirement rests on, derivations included: the weakest one alone does
-    not show that five others were only tested. Empty if computing it would take too long."""
-    if len(case.requirements) * len(case.obligations) > SUPPORT_STEPS:
-        return {}
-    below = {view.id: view.rests_on for view in case.obligations}
-    below |= {derivation_claim(d.derivation.name): d.rests_on for d in case.derivations}
-    below |= {requirement_claim(r.id): (*r.rests_on, *r.obligations) for r in case.requirements}
-    views = {view.id: view for view in case.obligations}
-    told = {}
-    for requirement in case.requirements:
-        seen: set[str] = set()
-        stack = [requirement_claim(requirement.id)]
-        while stack:
-            name = stack.pop()
-            if name not in seen:
-                seen.add(name)
-                stack += below.get(name, ())
-        told[requirement.id] = _stands(views[name] for name in seen - {*requirement.obligations} if name in views)
-    return told

@@ -155,9 +155,6 @@ PARTS_SEARCHED = 64
 CASES_KEPT = 50
 """Cases of one claim that are tried again: more cost each later run, and those of the newest tool runs tell most."""
 
-SUPPORT_STEPS = 2_000_000
-"""Requirements times obligations: beyond it, counting who rests on whom takes longer than the rest of the report."""
-
 VALUES_LOOKED_AT = 500
 """So many values of one domain or column are looked at; a table may have a million."""
 
