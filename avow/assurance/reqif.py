@@ -2,8 +2,8 @@
 
 Reads the exports of tools: attribute values by the long names of their definitions, XHTML as text with its blocks
 separated, enumerations by their values' names, defaults if an object has no value of its own; in the order of the
-specifications' hierarchies. Chapter headings are no requirements. A document type is refused when it begins, in any
-encoding: nothing is fetched, nothing is expanded. Errors are diagnostics with a position.
+specifications' hierarchies. Chapter headings are no requirements. A document type is refused: nothing is
+fetched, nothing is expanded. Errors are diagnostics with a position.
 """
 
 from __future__ import annotations
@@ -11,13 +11,13 @@ from __future__ import annotations
 import io
 import zipfile
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
 from typing import NoReturn
+from xml.etree import ElementTree as ET
 from xml.parsers import expat
 
 from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.base.plain import bare
-from avow.base.tuning.sizes import REQIF_BYTES, REQIF_DEPTH
+from avow.base.tuning.sizes import REQIF_BYTES
 
 _BLOCKS = frozenset(
     ("p", "div", "br", "hr", "li", "ul", "ol", "dl", "dt", "dd", "table", "caption", "tr", "td", "th", "pre")
@@ -28,136 +28,59 @@ _OBJECT = " [a picture or embedded object] "
 _VALUE, _DEFINITION = "ATTRIBUTE-VALUE-", "ATTRIBUTE-DEFINITION-"
 _HEADING = ("reqif.chaptername", "chaptername", "heading")
 _HEADING_TYPES = ("heading", "chapter", "headline")
+_LINE = "line"
+"""An attribute that `_parse` gives each element: the line where it begins."""
+
+_Object = tuple[int, str, dict[str, str]]
+"""Line, name (or identifier), and the values by the attributes' long names, in small letters, with single blanks."""
 
 
-@dataclass(slots=True)
-class Thing:
-    """A SPEC-OBJECT: its values by the definitions' identifiers, and its line."""
-
-    line: int
-    identifier: str
-    name: str
-    kind: str = ""
-    values: dict[str, str] = field(default_factory=dict)
-
-
-@dataclass(slots=True)
-class _ReqifReader:
-    """Builds no tree: values are recorded while the file is read."""
-
-    file: str
-    parser: expat.XMLParserType
-    path: list[str] = field(default_factory=list)
-    things: dict[str, Thing] = field(default_factory=dict)
-    names: dict[str, str] = field(default_factory=dict)
-    """Definition → long name."""
-    defaults: dict[str, dict[str, str]] = field(default_factory=dict)
-    """Object type → definition → default value."""
-    types: dict[str, str] = field(default_factory=dict)
-    """Object type → long name."""
-    enumerated: dict[str, str] = field(default_factory=dict)
-    order: dict[str, None] = field(default_factory=dict)
-    """Objects in the order of the hierarchies."""
-    thing: Thing | None = None
-    type: str = ""
-    definition: str = ""
-    """The attribute definition that is being read, for its default."""
-    value: str = ""
-    """The text of the attribute value that is being read."""
-    reference: str = ""
-    text: list[str] = field(default_factory=list)
-    in_text: int = 0
-    """The depth within the value's XHTML."""
-
-    def start(self, name: str, attributes: dict[str, str]) -> None:
-        tag = name.rpartition("}")[2]
-        if len(self.path) >= REQIF_DEPTH:
-            raise Rejected(Diagnostic("REQS003", f"{self.file}: elements nest too deeply", self.at()))
-        self.path.append(tag)
-        if self.in_text:
-            self.in_text += 1
-            if tag.lower() in _BLOCKS:
-                self.text.append(" ")
-            elif tag.lower() == "object":
-                self.text.append(_OBJECT)
-        elif tag == "THE-VALUE":
-            self.in_text, self.text = 1, []
-        elif tag == "SPEC-OBJECT":
-            self.thing = Thing(self.at().line, attributes.get("IDENTIFIER", ""), attributes.get("LONG-NAME", ""))
-        elif tag in ("SPEC-OBJECT-TYPE", "SPECIFICATION-TYPE", "SPEC-RELATION-TYPE"):
-            self.type = attributes.get("IDENTIFIER", "")
-            self.types[self.type] = attributes.get("LONG-NAME", "")
-        elif tag == "ENUM-VALUE":
-            self.enumerated[attributes.get("IDENTIFIER", "")] = attributes.get("LONG-NAME", "")
-        elif tag.startswith(_VALUE):
-            self.value, self.reference = attributes.get("THE-VALUE", ""), ""
-        elif tag.startswith(_DEFINITION) and not tag.endswith("-REF"):
-            self.definition = attributes.get("IDENTIFIER", "")
-            self.names[self.definition] = attributes.get("LONG-NAME", "")
-        elif tag.endswith("-REF"):
-            self.text = []
-
-    def data(self, data: str) -> None:
-        if self.in_text or (self.path and self.path[-1].endswith("-REF")):
-            self.text.append(data)
-
-    def end(self, name: str) -> None:
-        tag = self.path.pop()
-        if self.in_text:
-            self.in_text -= 1
-            if self.in_text:
-                if tag.lower() in _BLOCKS:
-                    self.text.append(" ")
-            else:
-                self.value = "".join(self.text)
-        elif tag.endswith("-REF"):
-            self.refer(tag, "".join(self.text).strip())
-        elif tag.startswith(_VALUE):
-            self.settle()
-        elif tag == "SPEC-OBJECT" and self.thing is not None:
-            if self.thing.identifier in self.things:
-                message = f"{self.file}: two objects have the identifier '{self.thing.identifier}'"
-                raise Rejected(Diagnostic("REQS003", message, self.at()))
-            self.things[self.thing.identifier] = self.thing
-            self.thing = None
-
-    def refer(self, tag: str, target: str) -> None:
-        if tag.startswith(_DEFINITION):
-            self.reference = target
-        elif tag == "ENUM-VALUE-REF":
-            self.value = f"{self.value}\x00{target}"  # its name may come later in the file
-        elif tag == "SPEC-OBJECT-TYPE-REF" and self.thing is not None:
-            self.thing.kind = target
-        elif tag == "SPEC-OBJECT-REF" and "SPEC-HIERARCHY" in self.path:
-            self.order.setdefault(target)
-
-    def settle(self) -> None:
-        """Stores a value as an object's, or as the default in a definition."""
-        if self.thing is not None:
-            self.thing.values[self.reference] = self.value
-        elif "DEFAULT-VALUE" in self.path and self.type:
-            self.defaults.setdefault(self.type, {})[self.reference or self.definition] = self.value
-        self.value = ""
-
-    def at(self) -> Span:
-        line, column = self.parser.CurrentLineNumber, self.parser.CurrentColumnNumber + 1
-        return Span(self.file, line, column, line, column)
-
-
-def read_objects(data: bytes, file: str) -> Iterator[tuple[Thing, dict[str, str]]]:
-    """Every object that is no heading, with its values by the attributes' long names (in small letters, single blanks).
-    Raises Rejected."""
+def read_objects(data: bytes, file: str) -> Iterator[_Object]:
+    """Every object that is no heading. Raises Rejected."""
     for name, content in _documents(data, file):
-        reader = _parse(content, name)
-        if not reader.things:
+        root = _parse(content, name)
+        things: dict[str, ET.Element] = {}
+        for thing in root.iter("SPEC-OBJECT"):
+            if (key := thing.get("IDENTIFIER", "")) in things:
+                raise Rejected(
+                    Diagnostic("REQS003", f"{name}: two objects have the identifier '{key}'", _at(name, thing))
+                )
+            things[key] = thing
+        if not things:
             raise Rejected(Diagnostic("REQS002", f"{name} holds no SPEC-OBJECT", Span(name, 1, 1, 1, 1)))
-        listed = [reader.things[key] for key in reader.order if key in reader.things]
-        listed += [thing for key, thing in reader.things.items() if key not in reader.order]
-        for thing in listed:
-            values = {**reader.defaults.get(thing.kind, {}), **thing.values}
-            named = {bare(reader.names.get(key, "")): _plain(v, reader.enumerated) for key, v in values.items()}
-            if not _is_heading(named, bare(reader.types.get(thing.kind, ""))):
-                yield thing, named
+        definitions = [e for e in root.iter() if e.tag.startswith(_DEFINITION) and not e.tag.endswith("-REF")]
+        names = {e.get("IDENTIFIER", ""): bare(e.get("LONG-NAME", "")) for e in definitions}
+        enumerated = {e.get("IDENTIFIER", ""): e.get("LONG-NAME", "") for e in root.iter("ENUM-VALUE")}
+        types = {e.get("IDENTIFIER", ""): e for e in root.iter("SPEC-OBJECT-TYPE")}
+        order = [_text(ref) for part in root.iter("SPEC-HIERARCHY") for ref in part.findall("OBJECT/SPEC-OBJECT-REF")]
+        for thing in dict.fromkeys([*(things[key] for key in order if key in things), *things.values()]):
+            kind = types.get(next(map(_text, thing.iter("SPEC-OBJECT-TYPE-REF")), ""), ET.Element("none"))
+            found = {**_values(kind, enumerated), **_values(thing, enumerated)}
+            named = {names.get(key, ""): value for key, value in found.items()}
+            if not _is_heading(named, bare(kind.get("LONG-NAME", ""))):
+                shown = thing.get("LONG-NAME", "") or thing.get("IDENTIFIER", "")
+                yield _at(name, thing).line, shown, named
+
+
+def _values(holder: ET.Element, enumerated: Mapping[str, str]) -> dict[str, str]:
+    """Definition → value, of an object, or of the defaults of a type's definitions."""
+    found = {}
+    for value in (e for e in holder.iter() if e.tag.startswith(_VALUE)):
+        text = value.find("THE-VALUE")
+        parts = [value.get("THE-VALUE", "") if text is None else "".join(text.itertext())]
+        parts += [enumerated.get(mark, mark) for mark in map(_text, value.iter("ENUM-VALUE-REF"))]
+        definition = next((_text(ref) for part in value.findall("DEFINITION") for ref in part), "")
+        found[definition] = " ".join(", ".join(filter(None, parts)).split())
+    return found
+
+
+def _text(element: ET.Element) -> str:
+    return (element.text or "").strip()
+
+
+def _at(file: str, element: ET.Element) -> Span:
+    line = int(element.get(_LINE, "1"))
+    return Span(file, line, 1, line, 1)
 
 
 def _is_heading(values: Mapping[str, str], kind: str) -> bool:
@@ -168,34 +91,35 @@ def _is_heading(values: Mapping[str, str], kind: str) -> bool:
     return any(values.get(name) for name in _HEADING) and not any(texts)
 
 
-def _plain(value: str, enumerated: Mapping[str, str]) -> str:
-    first, *marks = value.split("\x00")
-    return " ".join(", ".join([*([first] if first else []), *(enumerated.get(m, m) for m in marks)]).split())
-
-
-def _parse(data: bytes, file: str) -> _ReqifReader:
-    parser = expat.ParserCreate(namespace_separator="}")
-    reader = _ReqifReader(file, parser)
+def _parse(data: bytes, file: str) -> ET.Element:
+    """The tree, with names without their namespaces, and blanks where XHTML's blocks begin and end."""
+    builder, parser = ET.TreeBuilder(), expat.ParserCreate(namespace_separator="}")
 
     def refuse(*_: object) -> NoReturn:
+        line = parser.CurrentLineNumber
         message = f"{file} declares a document type or entities: that is not accepted"
-        raise Rejected(Diagnostic("REQS003", message, reader.at()))
+        raise Rejected(Diagnostic("REQS003", message, Span(file, line, 1, line, 1)))
 
-    parser.buffer_text = True
+    def start(name: str, attributes: dict[str, str]) -> None:
+        tag = name.rpartition("}")[2]
+        builder.data(" " if tag.lower() in _BLOCKS else _OBJECT if tag.lower() == "object" else "")
+        builder.start(tag, {**attributes, _LINE: str(parser.CurrentLineNumber)})
+
+    def end(name: str) -> None:
+        tag = name.rpartition("}")[2]
+        builder.end(tag)
+        builder.data(" " if tag.lower() in _BLOCKS else "")
+
     parser.StartDoctypeDeclHandler = refuse
-    parser.EntityDeclHandler = refuse
-    parser.ExternalEntityRefHandler = refuse
-    parser.StartElementHandler = reader.start
-    parser.EndElementHandler = reader.end
-    parser.CharacterDataHandler = reader.data
+    parser.StartElementHandler, parser.EndElementHandler, parser.CharacterDataHandler = start, end, builder.data
     try:
         parser.Parse(data, True)
+        return builder.close()
     except expat.ExpatError as error:
         where = Span(file, error.lineno, error.offset + 1, error.lineno, error.offset + 1)
         raise Rejected(Diagnostic("REQS003", f"{file} is no XML: {expat.ErrorString(error.code)}", where)) from None
     except (ValueError, LookupError) as error:  # an encoding that Python does not know
         raise Rejected(Diagnostic("REQS003", f"{file} is no XML: {error}", Span(file, 1, 1, 1, 1))) from None
-    return reader
 
 
 def _documents(data: bytes, file: str) -> Iterator[tuple[str, bytes]]:
@@ -208,10 +132,7 @@ def _documents(data: bytes, file: str) -> Iterator[tuple[str, bytes]]:
             inside = [i for i in archive.infolist() if i.filename.lower().endswith((".reqif", ".xml"))]
             if sum(i.file_size for i in inside) > REQIF_BYTES:
                 raise Rejected(Diagnostic("REQS001", f"{file} unpacks to more than {REQIF_BYTES // 1_000_000} MB"))
-            found = []
-            for item in inside:
-                with archive.open(item) as stream:  # no more than the stated size: an archive may lie about its sizes
-                    found.append((f"{file}:{item.filename}", stream.read(item.file_size + 1)))
+            found = [(f"{file}:{item.filename}", archive.read(item)) for item in inside]
     except (zipfile.BadZipFile, NotImplementedError, RuntimeError, OSError, EOFError, ValueError) as error:
         raise Rejected(Diagnostic("REQS001", f"{file} is no archive that can be read: {error}")) from None
     if not found:

@@ -87,10 +87,10 @@ def read_csv(text: str, file: str) -> tuple[Requirement, ...]:
 def read_reqif(data: bytes, file: str) -> tuple[Requirement, ...]:
     """Raises Rejected."""
     found = []
-    for thing, values in read_objects(data, file):
+    for line, name, values in read_objects(data, file):
         cells = {field: next((values[n] for n in known if values.get(n)), "") for field, known in _COLUMNS.items()}
-        cells["id"] = cells["id"] or thing.name or thing.identifier
-        found.append((thing.line, cells))
+        cells["id"] = cells["id"] or name
+        found.append((line, cells))
     if not found:
         raise Rejected(Diagnostic("REQS002", f"{file} holds no requirement, but for headings", _at(file, 1)))
     if not any(cells["text"] for _, cells in found):
@@ -101,7 +101,7 @@ def read_reqif(data: bytes, file: str) -> tuple[Requirement, ...]:
 
 
 def _no_text(data: bytes, file: str) -> str:
-    names = dict.fromkeys(name for _, values in read_objects(data, file) for name in values if name)
+    names = dict.fromkeys(name for _, _, values in read_objects(data, file) for name in values if name)
     return f"{file} has no attribute with the requirements' text; its attributes: {', '.join(names)}"[:400]
 
 

@@ -2,9 +2,6 @@
 no input takes all memory or ends in a traceback.
 """
 
-REQIF_DEPTH = 400
-"""Elements within elements: beyond any export, well below what a program's stack bears."""
-
 REQIF_BYTES = 200_000_000
 """Of a file, and of all files that an archive holds, unpacked: an archive of a few kilobytes may unpack to anything."""
 
