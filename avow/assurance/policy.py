@@ -10,19 +10,19 @@
       proved: certified       a proof of the calculus or of a requirement needs a certificate that the kernel checked
       max_failure_rate: {high: 0.01}     how often a requirement that rests on samples may fail
 
-Profiles are data (`profiles.yaml`, beside this module). Errors are located diagnostics with codes POLICY001 to 005.
+Profiles are data (`profiles.yaml`, beside this module). The plan's schema has the form of the rules.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import field, replace
 from decimal import Decimal
 from functools import cache
 from typing import Any
 
 from avow.base import codec
-from avow.base.diagnostics import Diagnostic, Rejected, Span
+from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.packaged import packaged
 from avow.base.records import dataclass
 from avow.base.suggestions import suggest
@@ -125,171 +125,57 @@ def costs() -> Mapping[str, int]:
 
 
 def read_policy(located: Located) -> Policy:
-    """The policy of a plan's ``policy:`` section; ``default`` if there is none. Raises Rejected with all faults."""
-    match located.data:
-        case None | {} if not located.data:
-            return profile("default")
-        case str(name):
-            found, faults = _profile(name, located.at())
-        case Mapping():
-            found, faults = _rules(located)
-        case _:  # a number or a list
-            fault = "policy is a profile's name or a mapping of rules"
-            found, faults = profile("default"), [Diagnostic("POLICY002", fault, located.at())]
-    if faults:
-        raise Rejected(*faults)
-    return found
-
-
-def _profile(name: str, span: Span) -> tuple[Policy, list[Diagnostic]]:
-    if name in _data()[0]:
-        return profile(name), []
-    fault = Diagnostic("POLICY001", f"there is no policy profile '{name}'", span, hint=suggest(name, profile_names()))
-    return profile("default"), [fault]
-
-
-_KEYS = (
-    *("profile", "guarantees", "sanity", "composition", "requirements", "programs"),
-    *("reviewers", "certified", "proved", "max_failure_rate"),
-)
-_DEMAND_KEYS = (
-    *("one_of", "methods", "independent", "max_age_days", "reviewers", "ties", "unconditional", "isolation"),
-    *("of", "numbers", "cases"),
-)
-
-
-def _rules(located: Located) -> tuple[Policy, list[Diagnostic]]:
-    data: Mapping[str, Any] = located.data
-    faults = _unknown(data, _KEYS, located, ())
-    base, wrong = (
-        _profile(str(data["profile"]), located.at("profile")) if "profile" in data else (profile("default"), [])
-    )
-    faults += wrong
-    reader = _PolicyReader(located, faults)
-    rules = {key: reader.rule(key, value, base) for key, value in data.items() if key in _KEYS and key != "profile"}
-    name = f"{base.name}, with the plan's own rules" if set(data) - {"profile"} else base.name
-    return replace(base, name=name, **rules), faults
-
-
-def _demands(base: Policy, data: object, reader: _PolicyReader) -> tuple[tuple[str, Demand], ...]:
-    demands = dict(base.guarantees)
-    if not isinstance(data, Mapping):
-        reader.fault("guarantees maps a criticality to what it needs", ("guarantees",))
-        return base.guarantees
-    reader.faults += _unknown(data, CRITICALITIES, reader.located, ("guarantees",))
-    for criticality in CRITICALITIES:
-        if criticality in data:
-            demands[criticality] = reader.demand(data[criticality], ("guarantees", criticality))
-    return tuple(demands.items())
-
-
-class _PolicyReader:
-    """Reads plain data, collecting located faults."""
-
-    def __init__(self, located: Located, faults: list[Diagnostic]) -> None:
-        self.located = located
-        self.faults = faults
-
-    def fault(self, message: str, path: tuple[str | int, ...], hint: str | None = None) -> None:
-        where = ".".join(map(str, ("policy", *path)))
-        self.faults.append(Diagnostic("POLICY002", f"{where}: {message}", self.located.at(*path), hint=hint))
-
-    def rule(self, key: str, data: object, base: Policy) -> Any:
-        """The plan's value of a policy key, in the form of `Policy`."""
-        match key:
-            case "guarantees":
-                return _demands(base, data, self)
-            case "reviewers":
-                return self.texts(data, (key,))
-            case "certified":
-                return self.flag(data, (key,))
-            case "proved":
-                if data != "certified":
-                    self.fault(f"'{data}' is not what may be asked: certified", (key,))
-                return True
-            case "max_failure_rate":
-                return self.rates(data, (key,))
-            case "programs":  # `not-run` accepts that a program's claims stay open if its tool is missing
-                return self.statuses(data, (key,), (*_GIVEN, Status.NOT_RUN.value))
-            case _:  # the others name statuses
-                return self.statuses(data, (key,))
-
-    def demand(self, data: object, path: tuple[str | int, ...]) -> Demand:
-        if not isinstance(data, Mapping):
-            self.fault(f"a demand is a mapping with keys out of {', '.join(_DEMAND_KEYS)}", path)
-            return Demand()
-        self.faults += _unknown(data, _DEMAND_KEYS, self.located, path)
-        return Demand(
-            # any other demand also demands support, of any status
-            one_of=self.statuses(data.get("one_of") or (_GIVEN if {*data} - {"one_of"} else ()), (*path, "one_of")),
-            methods=self.count(data.get("methods", 1), (*path, "methods")),
-            independent=self.flag(data.get("independent", False), (*path, "independent")),
-            max_age_days=self.ages(data.get("max_age_days", {}), (*path, "max_age_days")),
-            reviewers=self.count(data.get("reviewers", 1), (*path, "reviewers")),
-            cases=self.count(data.get("cases", 0), (*path, "cases")),
-            links=tuple(Link(word) for word in self.words(data.get("ties", ()), tuple(Link), (*path, "ties"))),
-            unconditional=self.flag(data.get("unconditional", False), (*path, "unconditional")),
-            isolation=self.level(data.get("isolation", Isolation.NONE.value), (*path, "isolation")),
-            of=tuple(Object(word) for word in self.words(data.get("of", ()), tuple(Object), (*path, "of"))),
-            numbers=tuple(
-                Numbers(word) for word in self.words(data.get("numbers", ()), tuple(Numbers), (*path, "numbers"))
-            ),
+    """The policy of a plan's ``policy:`` section, which has the form of the plan's schema; ``default`` if there is
+    none. Raises Rejected (``POLICY001``) for a profile that does not exist."""
+    rules = {"profile": located.data} if isinstance(located.data, str) else dict(located.data or {})
+    name = rules.pop("profile", "default")
+    if name not in profile_names():
+        hint = suggest(name, profile_names())
+        raise Rejected(
+            Diagnostic("POLICY001", f"there is no policy profile '{name}'", located.at("profile"), hint=hint)
         )
+    base = profile(name)
+    own = {key: _rule(key, value, base) for key, value in rules.items()}
+    return replace(base, name=f"{name}, with the plan's own rules" if own else name, **own)
 
-    def level(self, data: object, path: tuple[str | int, ...]) -> Isolation:
-        if not isinstance(data, str):
-            self.fault(f"isolation is one of {', '.join(Isolation)}", path)
-        given = self.words(data, tuple(Isolation), path) if isinstance(data, str) else ()
-        return Isolation(given[0]) if given else Isolation.NONE
 
-    def statuses(
-        self, data: object, path: tuple[str | int, ...], allowed: tuple[str, ...] = _GIVEN
-    ) -> tuple[Status, ...]:
-        return tuple(Status(word) for word in self.words(data, allowed, path))
+def _rule(key: str, data: Any, base: Policy) -> Any:
+    """The plan's value of a policy's key, in the form of `Policy`."""
+    match key:
+        case "guarantees":
+            return tuple({**dict(base.guarantees), **{c: _demand(rules) for c, rules in data.items()}}.items())
+        case "reviewers":
+            return _listed(data)
+        case "certified":
+            return data
+        case "proved":
+            return True
+        case "max_failure_rate":
+            return tuple((c, str(Decimal(str(data[c])))) for c in CRITICALITIES if c in data)
+        case _:  # the others name statuses
+            return tuple(map(Status, _listed(data)))
 
-    def words(self, data: object, allowed: tuple[str, ...], path: tuple[str | int, ...]) -> tuple[str, ...]:
-        found = self.texts(data, path)
-        for at, word in enumerate(found):
-            if word not in allowed:
-                self.fault(f"'{word}' is none of {', '.join(allowed)}", (*path, at), suggest(word, allowed))
-        return tuple(word for word in found if word in allowed)
 
-    def texts(self, data: object, path: tuple[str | int, ...]) -> tuple[str, ...]:
-        items = [data] if isinstance(data, str) else data
-        if not isinstance(items, list | tuple) or not all(isinstance(item, str) for item in items):
-            self.fault("a list of words is wanted", path)
-            return ()
-        return tuple(items)
+def _demand(data: Mapping[str, Any]) -> Demand:
+    ages = data.get("max_age_days", {})
+    return Demand(
+        # any other demand also demands support, of any status
+        one_of=tuple(map(Status, _listed(data.get("one_of") or (_GIVEN if {*data} - {"one_of"} else ())))),
+        methods=data.get("methods", 1),
+        independent=data.get("independent", False),
+        max_age_days=tuple(ages.items()) if isinstance(ages, Mapping) else (("all", ages),),
+        reviewers=data.get("reviewers", 1),
+        cases=data.get("cases", 0),
+        links=tuple(map(Link, _listed(data.get("ties", ())))),
+        unconditional=data.get("unconditional", False),
+        isolation=Isolation(data.get("isolation", Isolation.NONE)),
+        of=tuple(map(Object, _listed(data.get("of", ())))),
+        numbers=tuple(map(Numbers, _listed(data.get("numbers", ())))),
+    )
 
-    def count(self, data: object, path: tuple[str | int, ...]) -> int:
-        if isinstance(data, bool) or not isinstance(data, int) or not 0 <= data <= 100_000:
-            self.fault("a whole number, 0 or more, is wanted", path)
-            return 1
-        return data
 
-    def flag(self, data: object, path: tuple[str | int, ...]) -> bool:
-        if not isinstance(data, bool):
-            self.fault("true or false is wanted", path)
-            return False
-        return data
-
-    def rates(self, data: object, path: tuple[str | int, ...]) -> tuple[tuple[str, str], ...]:
-        if not isinstance(data, Mapping):
-            self.fault("a mapping of criticalities to greatest rates of failure is wanted, such as {high: 0.01}", path)
-            return ()
-        self.faults += _unknown(data, CRITICALITIES, self.located, path)
-        for criticality, rate in data.items():
-            if isinstance(rate, bool) or not isinstance(rate, int | float) or not 0 < rate < 1:
-                self.fault("a number between 0 and 1 is wanted", (*path, criticality))
-                return ()
-        return tuple((c, str(Decimal(str(data[c])))) for c in CRITICALITIES if c in data)
-
-    def ages(self, data: object, path: tuple[str | int, ...]) -> tuple[tuple[str, int], ...]:
-        if not isinstance(data, Mapping):
-            return (("all", self.count(data, path)),)
-        named = {str(word): self.count(days, (*path, word)) for word, days in data.items()}
-        self.faults += _unknown(named, (*_GIVEN, "all"), self.located, path)
-        return tuple(named.items())
+def _listed(data: Any) -> tuple[str, ...]:
+    return (data,) if isinstance(data, str) else tuple(data)
 
 
 def asked_of(demand: Demand) -> str:
@@ -297,42 +183,23 @@ def asked_of(demand: Demand) -> str:
     return " or ".join(status.value for status in demand.one_of)
 
 
-def _unknown(
-    data: Mapping[Any, Any], allowed: Iterable[str], located: Located, path: tuple[str | int, ...]
-) -> list[Diagnostic]:
-    known = tuple(allowed)
-    return [
-        Diagnostic(
-            "POLICY003",
-            f"{'.'.join(map(str, ('policy', *path)))}: unknown key '{key}'; known: {', '.join(known)}",
-            located.key(*path, key),
-            hint=suggest(str(key), known),
-        )
-        for key in data
-        if key not in known
-    ]
-
-
 @cache
 def _data() -> tuple[dict[str, Policy], dict[str, int]]:
     data = packaged("avow.assurance", "profiles.yaml")
-    faults: list[Diagnostic] = []
-    policies = {}
-    for name, raw in data["profiles"].items():
-        reader = _PolicyReader(Located(raw, Span("profiles.yaml", 1, 1, 1, 1)), faults)
-        policies[name] = Policy(
+    policies = {
+        name: Policy(
             name=name,
             title=raw["title"],
             about=raw["about"].strip(),
-            guarantees=tuple((c, reader.demand(raw["guarantees"][c], ("guarantees", c))) for c in CRITICALITIES),
-            sanity=reader.statuses(raw["sanity"], ("sanity",)),
-            composition=reader.statuses(raw["composition"], ("composition",)),
-            requirements=reader.statuses(raw["requirements"], ("requirements",)),
-            programs=reader.statuses(raw["programs"], ("programs",)),
+            guarantees=tuple((c, _demand(raw["guarantees"][c])) for c in CRITICALITIES),
+            sanity=tuple(map(Status, raw["sanity"])),
+            composition=tuple(map(Status, raw["composition"])),
+            requirements=tuple(map(Status, raw["requirements"])),
+            programs=tuple(map(Status, raw["programs"])),
             certified=raw.get("certified", False),
             standard=raw.get("standard", ""),
             level=str(raw.get("level", "")),
         )
-    if faults:
-        raise Rejected(*faults)
+        for name, raw in data["profiles"].items()
+    }
     return policies, data["cost"]

@@ -15,12 +15,14 @@ from avow.assurance.gap import independent
 from avow.assurance.model import Case, MethodInfo
 from avow.assurance.policy import Demand, costs, profile, profile_names, read_policy
 from avow.base.diagnostics import Rejected, Span
+from avow.base.packaged import packaged
 from avow.base.verdict import Link, Object, Verdict
 from avow.evidence.obligation import Kind, Obligation
 from avow.evidence.record import CASE, ISOLATION, SIGNED_BY, SOLVER, Evidence
 from avow.evidence.status import Status
 from avow.report.short import terminal_lines
 from avow.system.plan import Finding, Located, Requirement
+from avow.system.schema import plan_schema, violations
 
 
 def located(data: Any) -> Located:
@@ -72,42 +74,41 @@ def test_rules_replace_what_they_name() -> None:
     assert policy.demand("unheard of") == policy.demand("high")
 
 
-@pytest.mark.parametrize(
-    ("data", "path", "word"),
-    [
-        ("sil5", (), "sil5"),
-        (3, (), "profile's name"),
-        ({"profile": "defautl"}, ("profile",), "defautl"),
-        ({"guarantee": {}}, ("guarantee",), "unknown key 'guarantee'"),
-        ({"guarantees": []}, ("guarantees",), "maps a criticality"),
-        ({"guarantees": {"hihg": {}}}, ("guarantees", "hihg"), "hihg"),
-        ({"guarantees": {"high": {"one_of": ["refuted"]}}}, ("guarantees", "high", "one_of", 0), "refuted"),
-        ({"guarantees": {"high": {"methods": -1}}}, ("guarantees", "high", "methods"), "whole number"),
-        ({"guarantees": {"high": {"methods": True}}}, ("guarantees", "high", "methods"), "whole number"),
-        ({"guarantees": {"high": {"independent": "yes"}}}, ("guarantees", "high", "independent"), "true or false"),
-        (
-            {"guarantees": {"high": {"max_age_days": {"proven": 3}}}},
-            ("guarantees", "high", "max_age_days", "proven"),
-            "proven",
-        ),
-        ({"guarantees": {"high": 2}}, ("guarantees", "high"), "mapping"),
-        ({"sanity": {"a": 1}}, ("sanity",), "list of words"),
-        ({"certified": "on"}, ("certified",), "true or false"),
-    ],
-)
-def test_errors_are_located(data: Any, path: tuple[str | int, ...], word: str) -> None:
-    where = located(data)
-    with pytest.raises(Rejected) as caught:
-        read_policy(where)
-    fault = caught.value.diagnostics[0]
-    assert word in fault.message
-    assert fault.span == where.at(*path)
+def test_the_plans_schema_has_the_form_of_a_policy() -> None:
+    """A wrong policy is a fault of the plan's form; a profile is data of the same form."""
+    rules = plan_schema()
+    rules = {**rules["properties"]["policy"], "$defs": rules["$defs"]}
+    for wrong in (
+        {"guarantee": {}},
+        {"guarantees": []},
+        {"guarantees": {"hihg": {}}},
+        {"guarantees": {"high": {"one_of": ["refuted"]}}},
+        {"guarantees": {"high": {"methods": -1}}},
+        {"guarantees": {"high": {"methods": True}}},
+        {"guarantees": {"high": {"independent": "yes"}}},
+        {"guarantees": {"high": {"max_age_days": {"proven": 3}}}},
+        {"guarantees": {"high": {"isolation": "seald"}}},
+        {"guarantees": {"high": 2}},
+        {"sanity": {"a": 1}},
+        {"certified": "on"},
+        {"proved": "claimed"},
+        {"max_failure_rate": {"high": 1}},
+        3,
+    ):
+        assert len(violations(located(wrong), rules)) == 1, wrong
+    (slip,) = violations(located({"requirments": ["proved"]}), rules)
+    assert slip.hint == "did you mean `requirements`?"
+    for profile_rules in packaged("avow.assurance", "profiles.yaml")["profiles"].values():
+        own = {key: value for key, value in profile_rules.items() if key in rules["properties"]}
+        assert violations(located(own), rules) == ()
 
 
-def test_all_faults_are_told_at_once() -> None:
+@pytest.mark.parametrize(("data", "path"), [("sil5", ()), ({"profile": "defautl"}, ("profile",))])
+def test_a_profile_that_does_not_exist_is_told_with_its_place(data: Any, path: tuple[str, ...]) -> None:
     with pytest.raises(Rejected) as caught:
-        read_policy(located({"profile": "x", "sanity": ["y"], "z": 1}))
-    assert len(caught.value.diagnostics) == 3
+        read_policy(located(data))
+    (fault,) = caught.value.diagnostics
+    assert (fault.code, fault.span) == ("POLICY001", located(data).at(*path))
 
 
 def the_case(policy: Any, *records: Evidence, criticality: str = "high") -> Case:
@@ -378,12 +379,6 @@ def test_the_gates_agree_on_an_assumption_and_each_that_fails_has_a_next_step(na
     assert all(g.suggestions for g in found.gates if not g.passed and g.id != "standard")
     alone = environment(policy=name, formal=True, reason=True)
     assert gate(alone, "requirements")[0] == (Status.JUSTIFIED in profile(name).requirements)
-
-
-def test_of_a_slip_the_word_that_was_meant_is_told() -> None:
-    with pytest.raises(Rejected) as caught:
-        read_policy(located({"requirments": ["proved"]}))
-    assert caught.value.diagnostics[0].hint == "did you mean `requirements`?"
 
 
 def test_a_requirement_in_prose_is_excused_by_no_risk() -> None:

@@ -13,7 +13,6 @@ from avow.assurance.case import conclude_again
 from avow.assurance.model import Case
 from avow.assurance.rates import misstated
 from avow.base.codec import from_json, to_json
-from avow.base.diagnostics import Rejected
 from avow.base.verdict import Verdict
 from avow.evidence.obligation import Kind
 from avow.evidence.record import COMPOSES, RATE, Evidence
@@ -157,12 +156,6 @@ def test_a_limit_asks_for_joint_confidence_and_for_a_rate() -> None:
     passed, why = gate(three(*ALL[:2], evidence("c.g", Verdict.TESTED, "hypothesis"), policy=limit))
     assert not passed
     assert "failure rate of the requirement unknown" in why
-
-
-@pytest.mark.parametrize("data", [0.1, {"medium": 0}, {"medium": 1}, {"medium": "much"}, {"grave": 0.1}])
-def test_a_limit_is_a_number_by_criticality(data: Any) -> None:
-    with pytest.raises(Rejected):
-        three(*ALL, policy={"max_failure_rate": data})
 
 
 SAYS_NO_STANDING = {
