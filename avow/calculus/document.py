@@ -63,7 +63,6 @@ class Derived:
     name: str
     rule: str
     text: str
-    latex: str
     conclusion: str
     premises: tuple[str, ...]
     side_conditions: tuple[Condition, ...]

@@ -1,7 +1,6 @@
 """Derivations as the paper writes them: premises, linking equations, side conditions, a line, the conclusion.
 
-One structure (`Lines`) is printed as text and as LaTeX, so that these cannot differ. Names come from contracts, and the
-LaTeX printer escapes them.
+Names come from contracts.
 """
 
 from __future__ import annotations
@@ -13,46 +12,14 @@ from avow.base.tuning.shown import RULE_NODES
 from avow.base.verdict import Verdict
 from avow.calculus.derivation import Derivation, Goal, Rule, Settled, SideCondition
 from avow.evidence.obligation import SYSTEM_LEVEL, Kind
-from avow.language.styles import latex_escape
 from avow.system.plan import Edge
-
-# -- a little mathematics ----------------------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True, slots=True)
-class Symbol:
-    """𝒜, 𝒢, i or o of a node: ``𝒢_navigation(o_navigation)``, a vector, or a word."""
-
-    kind: str
-    node: str
-
-
-Part = str | Symbol
-"""A piece of a line: a symbol of the calculus, or one of the connectives below as plain text."""
-
-_LATEX = {
-    "∀": r"\forall ",
-    "⇒": r"\Rightarrow ",
-    "◇": r"\lozenge ",
-    "∧": r"\land ",
-    "∪": r"\cup ",
-    "=": "=",
-    "⊆": r"\subseteq ",
-    "⊢": r"\vdash ",
-    "·": r"\cdot ",
-    "⊤": r"\top ",
-    ",": ",",
-    "(": "(",
-    ")": ")",
-    "…": r"\ldots ",
-}
 
 
 @dataclass(frozen=True, slots=True)
 class Line:
     """One line of a derivation. `remark` is prose."""
 
-    parts: tuple[Part, ...]
+    parts: tuple[str, ...]
     remark: str = ""
 
 
@@ -82,7 +49,6 @@ class Written:
     name: str
     rule: str
     text: str
-    latex: str
     conclusion: str
     premises: tuple[str, ...]
     """Nodes, or names of other derivations of this system."""
@@ -115,7 +81,6 @@ def write_goal(goal: Goal, settled: Mapping[SideCondition, Settled] | None = Non
         goal.name,
         goal.root.rule.value,
         "\n\n".join([*map(_as_text, written), *_joined(goal.contract)]),
-        "\n\n".join(map(as_latex, written)),
         _plain(conclusion.parts),
         tuple(dict.fromkeys(node for part in goal.root.walk() if part.rule is Rule.PREMISE for node in part.nodes)),
         conditions,
@@ -161,12 +126,17 @@ def _shortened(children: tuple[Derivation, ...]) -> Iterator[Derivation | None]:
 
 
 def _contract(node: str, remark: str = "") -> Line:
-    i, o = Symbol("i", node), Symbol("o", node)
-    return Line(("∀", i, ",", o, "·", *_applied("A", node), "⇒", "◇", *_applied("G", node)), remark)
+    i, o = _symbol("i", node), _symbol("o", node)
+    return Line(("∀", i, ",", o, "·", *_applied("𝒜", node), "⇒", "◇", *_applied("𝒢", node)), remark)
 
 
-def _applied(kind: str, node: str) -> tuple[Part, ...]:
-    return Symbol(kind, node), "(", Symbol("i" if kind == "A" else "o", node), ")"
+def _symbol(kind: str, node: str) -> str:
+    """``𝒢_navigation``, ``o_navigation``; `kind` is 𝒜, 𝒢, i or o."""
+    return node if node == "…" else f"{kind}_{node}"
+
+
+def _applied(kind: str, node: str) -> tuple[str, ...]:
+    return _symbol(kind, node), "(", _symbol("i" if kind == "𝒜" else "o", node), ")"
 
 
 def _linking(part: Derivation) -> Iterator[Line]:
@@ -178,9 +148,9 @@ def _linking(part: Derivation) -> Iterator[Line]:
         if number >= RULE_NODES:
             yield Line(("…",))
             return
-        parts: list[Part] = [Symbol("i", consumer), "="]
+        parts: list[str] = [_symbol("i", consumer), "="]
         for k, provider in enumerate(dict.fromkeys(edge.source.node for edge in edges)):
-            parts += ["∪", Symbol("o", provider)] if k else [Symbol("o", provider)]
+            parts += ["∪", _symbol("o", provider)] if k else [_symbol("o", provider)]
         outside = [text for text in part.outside if text.startswith(f"{consumer}.")]
         remarks = [f"{edge.source} one step before" for edge in edges if edge.delayed]
         remarks += [f"up to {text}" for text in outside]
@@ -195,10 +165,10 @@ def _condition_lines(part: Derivation, settled: Mapping[SideCondition, Settled])
             yield Line(("…",))
             return
         conditions = [condition for condition in part.side_conditions if condition.consumer == consumer]
-        parts: list[Part] = ["⊢", "("]
+        parts: list[str] = ["⊢", "("]
         for k, provider in enumerate(dict.fromkeys(e.source.node for e in part.linking if e.target.node == consumer)):
-            parts += ["∧", *_applied("G", provider)] if k else list(_applied("G", provider))
-        parts += [*["⊤"] * (len(parts) == 2), "⇒", *_applied("A", consumer), ")"]
+            parts += ["∧", *_applied("𝒢", provider)] if k else list(_applied("𝒢", provider))
+        parts += [*["⊤"] * (len(parts) == 2), "⇒", *_applied("𝒜", consumer), ")"]
         yield Line(tuple(parts), "; ".join(_condition_remark(c, settled.get(c)) for c in conditions))
 
 
@@ -220,17 +190,17 @@ def _condition_text(condition: SideCondition) -> str:
 
 def _conclusion(part: Derivation) -> Line:
     assumed = tuple(dict.fromkeys(name.node for name in part.assumed))
-    parts: list[Part] = ["∀"]
+    parts: list[str] = ["∀"]
     for node in _few(assumed):
-        parts += [Symbol("i", node), ","]
+        parts += [_symbol("i", node), ","]
     for node in _few(part.guaranteed):
-        parts += [Symbol("o", node), ","]
+        parts += [_symbol("o", node), ","]
     parts[-1] = "·"
     for k, node in enumerate(_few(assumed)):
-        parts += ["∧", *_applied("A", node)] if k else list(_applied("A", node))
+        parts += ["∧", *_applied("𝒜", node)] if k else list(_applied("𝒜", node))
     parts += ["⇒"] if assumed else ["⊤", "⇒"]
     for k, node in enumerate(_few(part.guaranteed)):
-        parts += ["∧", "◇", *_applied("G", node)] if k else ["◇", *_applied("G", node)]
+        parts += ["∧", "◇", *_applied("𝒢", node)] if k else ["◇", *_applied("𝒢", node)]
     clauses = [str(name) for name in part.assumed]
     shown = ", ".join(clauses) if len(clauses) <= 8 else f"{', '.join(clauses[:8])}, … ({len(clauses)} in all)"
     return Line(tuple(parts), f"assuming {shown}" if clauses else "")
@@ -242,16 +212,13 @@ def _few(nodes: tuple[str, ...]) -> tuple[str, ...]:
 
 # -- printers ----------------------------------------------------------------------------------------------------------
 
-_KINDS = {"A": "𝒜", "G": "𝒢", "i": "i", "o": "o"}
 _SPACED = ("⇒", "∧", "∪", "=", "⊆")
 
 
-def _plain(parts: tuple[Part, ...]) -> str:
+def _plain(parts: tuple[str, ...]) -> str:
     text = ""
     for part in parts:
-        if isinstance(part, Symbol):
-            text += "…" if part.node == "…" else f"{_KINDS[part.kind]}_{part.node}"
-        elif part in _SPACED:
+        if part in _SPACED:
             text += f" {part} "
         elif part in (",", "·"):
             text += ", " if part == "," else " · "
@@ -270,33 +237,6 @@ def _as_text(lines: Lines) -> str:
     title = f"{lines.rule} ({lines.name})" if lines.name else lines.rule
     provided = [f"  provided that {hypothesis}" for hypothesis in lines.hypotheses]
     return "\n".join([title, *above, "─" * width, *below, *provided])
-
-
-def as_latex(lines: Lines) -> str:
-    """An array as in the paper; needs `amsmath` and `amssymb`."""
-
-    def shown(line: Line) -> str:
-        remark = rf"\quad\text{{\footnotesize {latex_escape(line.remark)}}}" if line.remark else ""
-        return "".join(map(_latex_part, line.parts)) + remark
-
-    title = latex_escape(f"{lines.rule} ({lines.name})" if lines.name else lines.rule)
-    rows = [shown(line) for line in lines.above]
-    rows[-1:] = [rows[-1] + r" \\ \hline"] if rows else [r"\hline"]
-    body = [*(row + r" \\" for row in rows[:-1]), rows[-1], *(shown(line) + r" \\" for line in lines.below)]
-    provided = [rf"\text{{\footnotesize provided that {latex_escape(text)}}} \\" for text in lines.hypotheses]
-    array = "\n".join([r"\begin{array}{l}", *body, *provided, r"\end{array}"])
-    return f"\\textbf{{{title}}}\n\\[\n{array}\n\\]"
-
-
-def _latex_part(part: Part) -> str:
-    if not isinstance(part, Symbol):
-        return _LATEX[part]
-    if part.node == "…":
-        return r"\ldots "
-    name = rf"\mathrm{{{latex_escape(part.node)}}}"
-    if part.kind in ("i", "o"):
-        return rf"\overline{{{part.kind}_{{{name}}}}}"
-    return rf"\mathcal{{{part.kind}}}_{{{name}}}"
 
 
 def _remarked(text: str, remark: str) -> str:

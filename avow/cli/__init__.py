@@ -49,7 +49,7 @@ COMMANDS = {
     "sanity": "check whether a contract is worth verifying: consistent, realizable, not vacuous",
     "sign": "sign a report; later reports list the changes since the signature",
     "simulate": "run the composed contracts over the plan's scenario",
-    "translate": "translate a contract to LaTeX, text, JSON, SMT-LIB, …",
+    "translate": "translate a contract to mathematics, JSON, SMT-LIB, …",
     "validate": "record that a person read requirements' sentences against their formulas",
     "verify": "verify every system: check, compose, discharge, report",
     "worker": "start a worker that executes jobs of `avow verify --on` on another machine",

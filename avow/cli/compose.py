@@ -73,13 +73,10 @@ def progress(total: int) -> Iterator[Progress]:
 @click.argument("path", metavar="SYSTEM", type=ContractArgument())
 @click.option("--goal", "goals", multiple=True, metavar="NAME", help="Only this derivation (may be repeated).")
 @json_option("see docs/schemas/compose.schema.json")
-@click.option("--latex", "as_latex", is_flag=True, help="The derivations as LaTeX, nothing else.")
 @click.option("--rcl", "as_rcl", is_flag=True, help="The derived system-level contract as RCL, nothing else.")
 @seconds_option(10.0)
 @seed_option()
-def command(
-    path: Path, goals: tuple[str, ...], as_json: bool, as_latex: bool, as_rcl: bool, seconds: float, seed: int
-) -> int:
+def command(path: Path, goals: tuple[str, ...], as_json: bool, as_rcl: bool, seconds: float, seed: int) -> int:
     """Combine the contracts of a system's nodes by the rules R1-R4, and discharge the side conditions and the
     requirements that have a formula.
 
@@ -98,9 +95,6 @@ def command(
 
     bounds = Bounds(from_seconds(seconds), seed)
     chosen = [goal for goal in composition.goals if not goals or goal.name in goals]
-    if as_latex:
-        click.echo("\n\n".join(write_goal(goal).latex for goal in chosen))
-        return 0
     if as_rcl:
         goal = chosen[-1] if goals else composition.whole
         parts = list(goal.inner_first())

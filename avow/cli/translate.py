@@ -22,7 +22,7 @@ from avow.system.plan import System
 from avow.system.plan_file import read_plan
 
 NOTATIONS = {
-    **dict.fromkeys(("rcl", "text", "unicode", "latex", "json"), "avow.language.translate"),
+    **dict.fromkeys(("rcl", "unicode", "json"), "avow.language.translate"),
     "smtlib": "avow.solving.smtlib",
     "fretish": "avow.fretish.writing",
 }
@@ -55,8 +55,7 @@ def command(paths: tuple[Path, ...], notation: str, nodes: tuple[str, ...], outp
         return _by_backend(notation, paths, nodes, output, as_json)
     contract = _only(load_contract(_files(paths)), nodes)
     module = importlib.import_module(NOTATIONS[notation])
-    translate = getattr(module, "FORMATS", {}).get(notation) or getattr(module, f"to_{notation}")
-    translated = translate(contract)
+    translated = getattr(module, f"to_{notation}")(contract)
     text = translated if isinstance(translated, str) else translated.text
     missing = [] if isinstance(translated, str) else translated.missing
     if missing and not text:

@@ -12,9 +12,8 @@ from dataclasses import replace
 from avow.base.diagnostics import Span
 from avow.base.remembered import by_identity
 from avow.language.contract import Clause, Definition, Node
-from avow.language.printer import show_term
+from avow.language.printer import StyleName, show_term
 from avow.language.sorts import FunctionSort
-from avow.language.styles import StyleName
 from avow.language.subterms import subterms
 from avow.language.terms import Apply, Quantified, Role, Term, Variable
 
@@ -53,8 +52,7 @@ def show_clause(clause: Clause, node: Node, style: StyleName = "unicode") -> str
     the definitions."""
     known = used(clause.text, node.definitions)
     shown = show_term(folded(clause.formula, known), style)
-    where = r",\ \text{where}\ " if style == "latex" else ", where "
-    return where.join((shown, "; ".join(_said(d, known, style) for d in known))) if known else shown
+    return ", where ".join((shown, "; ".join(_said(d, known, style) for d in known))) if known else shown
 
 
 def _said(definition: Definition, known: Sequence[Definition], style: StyleName) -> str:

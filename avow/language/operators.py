@@ -77,12 +77,12 @@ class Operator:
     """One operator. Infix signs include their spaces; an operator written like a function is given by its name."""
 
     name: str
-    """The RCL notation; the key in a table of operators."""
+    """The RCL name; the key in a table of operators."""
     level: Level
     typing: Typing
-    text: str
+    rcl: str
+    """The RCL notation between or before its operands."""
     unicode: str
-    latex: str
     evaluate: Callable[..., Any] | Why
     """A function from values (`avow.formulas.values`) to a value."""
     z3: Callable[..., Any] | Why
@@ -102,11 +102,6 @@ class Operator:
     takes: tuple[int, int | None] | Why
     """The least and greatest number of arguments, if it is written like a function."""
 
-    @property
-    def rcl(self) -> str:
-        """The RCL notation between or before its operands."""
-        return self.text.replace(self.text.strip(), self.name) if self.level is not Level.ATOM else self.name
-
 
 LIFTED = "lifted"
 _IN_PARTS = Why("its parts are evaluated one after another, as far as they are needed")
@@ -120,17 +115,15 @@ def _infix(
     name: str,
     level: Level,
     typing: Typing,
-    words: tuple[str, str, str],
+    unicode: str,
     evaluate: Callable[..., Any] | Why,
     z3: Callable[..., Any],
     smtlib: str,
     dafny: str,
     rml: str,
 ) -> Operator:
-    text, unicode, latex = (f" {word} " for word in words)
-    return Operator(
-        name, level, typing, text, unicode, latex, evaluate, z3, smtlib, dafny, rml, name, _A_FORM, _A_FORM
-    )  # fmt: skip
+    rcl, unicode = f" {name} ", f" {unicode} "
+    return Operator(name, level, typing, rcl, unicode, evaluate, z3, smtlib, dafny, rml, name, _A_FORM, _A_FORM)
 
 
 def _function(
@@ -144,10 +137,9 @@ def _function(
     definition: Callable[[Operation], Term] | Why,
     takes: tuple[int, int | None],
 ) -> Operator:
-    latex = rf"\mathrm{{{name}}}"
     return Operator(
-        name, Level.ATOM, typing, name, name, latex, evaluate, z3, smtlib, dafny, rml, _NOT_COMPUTED, definition, takes
-    )  # fmt: skip
+        name, Level.ATOM, typing, name, name, evaluate, z3, smtlib, dafny, rml, _NOT_COMPUTED, definition, takes
+    )
 
 
 def _differing(term: Operation) -> Term:
@@ -175,31 +167,31 @@ def _better(sign: str) -> Callable[[Operation], Term]:
 
 
 _ROWS = (
-    _infix("<=>", Level.IFF, Typing.FORMULAS, ("if and only if", "↔", r"\Leftrightarrow"), operator.eq,
+    _infix("<=>", Level.IFF, Typing.FORMULAS, "↔", operator.eq,
            lambda z, a, b: a == b, "=", "<==>", LIFTED),
-    _infix("->", Level.IMPLIES, Typing.FORMULAS, ("implies", "→", r"\Rightarrow"), _IN_PARTS,
+    _infix("->", Level.IMPLIES, Typing.FORMULAS, "→", _IN_PARTS,
            lambda z, a, b: z.Implies(a, b), "=>", "==>", LIFTED),
-    _infix("or", Level.OR, Typing.FORMULAS, ("or", "∨", r"\lor"), _IN_PARTS,
+    _infix("or", Level.OR, Typing.FORMULAS, "∨", _IN_PARTS,
            lambda z, *parts: z.Or(parts), "or", "||", "||"),
-    _infix("and", Level.AND, Typing.FORMULAS, ("and", "∧", r"\land"), _IN_PARTS,
+    _infix("and", Level.AND, Typing.FORMULAS, "∧", _IN_PARTS,
            lambda z, *parts: z.And(parts), "and", "&&", "&&"),
-    Operator("not", Level.NOT, Typing.FORMULA, "not ", "¬", r"\lnot ", operator.not_,
+    Operator("not", Level.NOT, Typing.FORMULA, "not ", "¬", operator.not_,
              lambda z, a: z.Not(a), "not", "!", LIFTED, "not", _A_FORM, _A_FORM),
-    _infix("==", Level.COMPARE, Typing.EQUALS, ("is", "=", "="), operator.eq,
+    _infix("==", Level.COMPARE, Typing.EQUALS, "=", operator.eq,
            lambda z, a, b: a == b, "=", "==", "=="),
-    _infix("!=", Level.COMPARE, Typing.EQUALS, ("is not", "≠", r"\neq"), operator.ne,
+    _infix("!=", Level.COMPARE, Typing.EQUALS, "≠", operator.ne,
            lambda z, a, b: a != b, "distinct", "!=", "!="),
-    _infix("<", Level.COMPARE, Typing.ORDER, ("<", "<", "<"), operator.lt, lambda z, a, b: a < b, "<", "<", "<"),
-    _infix("<=", Level.COMPARE, Typing.ORDER, ("<=", "≤", r"\leq"), operator.le,
+    _infix("<", Level.COMPARE, Typing.ORDER, "<", operator.lt, lambda z, a, b: a < b, "<", "<", "<"),
+    _infix("<=", Level.COMPARE, Typing.ORDER, "≤", operator.le,
            lambda z, a, b: a <= b, "<=", "<=", "<="),
-    _infix(">", Level.COMPARE, Typing.ORDER, (">", ">", ">"), operator.gt, lambda z, a, b: a > b, ">", ">", ">"),
-    _infix(">=", Level.COMPARE, Typing.ORDER, (">=", "≥", r"\geq"), operator.ge,
+    _infix(">", Level.COMPARE, Typing.ORDER, ">", operator.gt, lambda z, a, b: a > b, ">", ">", ">"),
+    _infix(">=", Level.COMPARE, Typing.ORDER, "≥", operator.ge,
            lambda z, a, b: a >= b, ">=", ">=", ">="),
-    _infix("+", Level.SUM, Typing.NUMBERS, ("+", "+", "+"), operator.add, lambda z, a, b: a + b, "+", "+", "+"),
-    _infix("-", Level.SUM, Typing.NUMBERS, ("-", "-", "-"), operator.sub, lambda z, a, b: a - b, "-", "-", "-"),
-    _infix("*", Level.PRODUCT, Typing.NUMBERS, ("*", "·", r"\cdot"), operator.mul,
+    _infix("+", Level.SUM, Typing.NUMBERS, "+", operator.add, lambda z, a, b: a + b, "+", "+", "+"),
+    _infix("-", Level.SUM, Typing.NUMBERS, "-", operator.sub, lambda z, a, b: a - b, "-", "-", "-"),
+    _infix("*", Level.PRODUCT, Typing.NUMBERS, "·", operator.mul,
            lambda z, a, b: a * b, "*", "*", "*"),
-    _infix("/", Level.PRODUCT, Typing.QUOTIENT, ("/", "/", "/"), lambda a, b: Fraction(a) / b,
+    _infix("/", Level.PRODUCT, Typing.QUOTIENT, "/", lambda a, b: Fraction(a) / b,
            lambda z, a, b: a / b, "/", "Types.Divide", "/"),
     _function(Builtin.XOR, Typing.FORMULAS, operator.ne, lambda z, a, b: z.Xor(a, b), "xor", "!=", LIFTED,
               _differing, (2, 2)),
@@ -213,8 +205,8 @@ _ROWS = (
               _ARITHMETIC, (2, 2)),
     _function(Builtin.DIV, Typing.WHOLE, operator.floordiv, lambda z, a, b: a / b, "div", "/", _NO_WHOLE_DIVISION,
               _ARITHMETIC, (2, 2)),
-    Operator("if", Level.LOOSEST, Typing.BRANCHES, "if ", "if ", r"\mathbf{if}\ ",
-             _IN_PARTS, lambda z, c, a, b: z.If(c, a, b), "ite", "if", LIFTED, _NOT_COMPUTED, _A_FORM, _A_FORM),
+    Operator("if", Level.LOOSEST, Typing.BRANCHES, "if ", "if ", _IN_PARTS, lambda z, c, a, b: z.If(c, a, b),
+             "ite", "if", LIFTED, _NOT_COMPUTED, _A_FORM, _A_FORM),
 )  # fmt: skip
 # Division and remainder are Euclid's, as in SMT-LIB and Dafny: with a positive divisor that is Python's floor division.
 

@@ -1,4 +1,4 @@
-"""Terms and sorts as text: RCL, Unicode mathematics, plain words, or LaTeX; with only the necessary parentheses.
+"""Terms and sorts as text: RCL, or Unicode mathematics; with only the necessary parentheses.
 
 Printing in the style ``rcl`` and reading the result gives an equal term (tests check this for generated terms).
 """
@@ -7,35 +7,97 @@ from __future__ import annotations
 
 from collections.abc import Container
 from fractions import Fraction
+from typing import Literal as OneOf
 from typing import assert_never
 
 from avow.base.plain import decimal
+from avow.base.records import dataclass
 from avow.language import sorts as s
 from avow.language import terms as t
+from avow.language.lexer import quote
 from avow.language.operators import OPERATORS, Level
-from avow.language.styles import STYLES, Style
-from avow.language.styles import StyleName as StyleName
-from avow.language.styles import latex_escape as latex_escape
 
 _LOOSEST, IFF, IMPLIES, OR, AND, LASTING, NOT, COMPARE, SUM, PRODUCT, UNARY, ATOM = Level
+StyleName = OneOf["unicode", "rcl"]
+
+
+@dataclass(frozen=True, slots=True)
+class _Style:
+    """The notation of each part of a term."""
+
+    words: dict[str, str]
+    quantifiers: dict[t.Quantifier, tuple[str, str, str]]
+    """The texts before the variables, after them, and after the body."""
+    sorts: dict[str, str]
+    times: str
+    arrow: str
+    unspecified: str
+    sequence: tuple[str, str]
+    tight_quantifier: bool
+    """Whether a quantifier is self-delimiting, so that it never needs parentheses."""
+    careful: bool = False
+    """Whether `and` and `or` get parentheses beside `->` and `<=>`, though they need none."""
+
+
+_WORDS = {
+    **{row.name: row.rcl for row in OPERATORS.values()},
+    **{word: f" {word} " for word in ("in", "!in", "upto", "then", "else")},
+    "TRUE": "TRUE",
+    "FALSE": "FALSE",
+}
+_STYLES: dict[StyleName, _Style] = {
+    "rcl": _Style(
+        words=_WORDS,
+        quantifiers={q: (f"{q.value}(", " | ", ")") for q in t.Quantifier},
+        sorts={name: name for name in s.BUILTINS},
+        times=" x ",
+        arrow=" --> ",
+        unspecified="{}",
+        sequence=("<", ">"),
+        tight_quantifier=True,
+        careful=True,
+    ),
+    "unicode": _Style(
+        words={
+            **_WORDS,
+            **{row.name: row.unicode for row in OPERATORS.values()},
+            "in": " ∈ ",
+            "!in": " ∉ ",
+            "upto": " … ",
+            "TRUE": "true",
+            "FALSE": "false",
+        },
+        quantifiers={
+            t.Quantifier.FORALL: ("∀ ", " · ", ""),
+            t.Quantifier.EXISTS: ("∃ ", " · ", ""),
+            t.Quantifier.UNIQUE: ("∃! ", " · ", ""),
+        },
+        sorts={"BOOL": "𝔹", "REAL": "ℝ", "INTEGER": "ℤ", "NATURAL": "ℕ", "STRING": "String"},
+        times=" × ",
+        arrow=" → ",
+        unspecified="unspecified",
+        sequence=("⟨", "⟩"),
+        tight_quantifier=False,
+    ),
+}
 _UP, _DOWN = frozenset(("<", "<=", "==")), frozenset((">", ">=", "=="))
 
 
 def show_term(term: t.Term, style: StyleName = "unicode") -> str:
-    """The term as text. `latex` is for mathematics mode, and escapes every name and string."""
-    return _Printer(STYLES[style]).show(term, _LOOSEST)
+    """The term as text."""
+    return _Printer(style).show(term, _LOOSEST)
 
 
 def show_sort(sort: s.Sort, style: StyleName = "rcl", named: Container[str] | None = None) -> str:
     """A sort by its name, or written out if it has none (or none of those `named`)."""
-    chosen = STYLES[style]
+    chosen = _STYLES[style]
     match sort:
         case s.BoolSort() | s.RealSort() | s.IntegerSort() | s.NaturalSort() | s.StringSort():
             return chosen.sorts[_BUILTIN[sort]]
         case s.EnumSort(name=name) | s.DataSort(name=name) | s.OpaqueSort(name=name) | s.TupleSort(name=name) if (
             name if named is None else name in named
         ):
-            return chosen.name(name)
+            return name
         case s.FunctionSort(parameters=parameters, result=result):
             left = chosen.times.join(_in_product(p, style, named) for p in parameters)
             return f"{left}{chosen.arrow}{_in_product(result, style, named)}"
@@ -49,23 +111,23 @@ def show_sort(sort: s.Sort, style: StyleName = "rcl", named: Container[str] | No
 
 def show_type(sort: s.Sort, style: StyleName = "rcl", named: Container[str] | None = None) -> str:
     """The sort as its declaration writes it: ``{red, orange, green}``, ``{}``."""
-    chosen = STYLES[style]
+    chosen = _STYLES[style]
     match sort:
         case s.EnumSort(members=members):
-            return chosen.braces(", ".join(chosen.name(m) for m in members))
+            return f"{{{', '.join(members)}}}"
         case s.DataSort(constructors=constructors):
             shown = []
             for c in constructors:
                 arguments = ", ".join(show_sort(p, style, named) for p in c.parameters)
-                shown.append(f"{chosen.name(c.name)}({arguments})" if arguments else chosen.name(c.name))
-            return chosen.braces(", ".join(shown))
+                shown.append(f"{c.name}({arguments})" if arguments else c.name)
+            return f"{{{', '.join(shown)}}}"
         case s.OpaqueSort():
             return chosen.unspecified
         case s.TupleSort(items=items, labels=labels):
             shown = [show_sort(item, style, named) for item in items]
             if not labels:
                 return f"({', '.join(shown)})"
-            return f"[{', '.join(f'{chosen.name(label)} : {part}' for label, part in zip(labels, shown, strict=True))}]"
+            return f"[{', '.join(f'{label} : {part}' for label, part in zip(labels, shown, strict=True))}]"
         case _:  # written out anyway
             return show_sort(sort, style, named)
 
@@ -79,8 +141,9 @@ _BUILTIN = {sort: name for name, sort in s.BUILTINS.items()}
 
 
 class _Printer:
-    def __init__(self, style: Style) -> None:
-        self.style = style
+    def __init__(self, name: StyleName) -> None:
+        self.name = name
+        self.style = _STYLES[name]
 
     def show(self, term: t.Term, place: int, *, real: bool = False) -> str:
         """`place`: how tightly the text must bind. `real`: a number here is read as a REAL in any case."""
@@ -95,12 +158,12 @@ class _Printer:
             case t.Literal():
                 return self.literal(term, real)
             case t.EnumValue(name=name):
-                return self.style.name(name), ATOM
+                return name, ATOM
             case t.Variable():
-                return self.style.name(self.variable(term)), ATOM
+                return self.variable(term), ATOM
             case t.Construct(constructor=name, arguments=arguments, sort=sort):
                 parameters = sort.constructor(name).parameters
-                return self.applied(self.style.name(name), arguments, parameters), ATOM
+                return self.applied(name, arguments, parameters), ATOM
             case t.Apply(function=function, arguments=arguments):
                 sort_ = function.sort
                 parameters = sort_.parameters if isinstance(sort_, s.FunctionSort) else ()
@@ -110,11 +173,11 @@ class _Printer:
             case t.Item(record=record, position=position):
                 labels = record.sort.labels if isinstance(record.sort, s.TupleSort) else ()
                 label = labels[position] if labels else str(position)
-                return f"{self.show(record, ATOM)}.{self.style.name(label)}", ATOM
+                return f"{self.show(record, ATOM)}.{label}", ATOM
             case t.Argument(value=value, constructor=name, position=position):
-                return f"{self.show(value, ATOM)}.{self.style.name(name)}.{position}", ATOM
+                return f"{self.show(value, ATOM)}.{name}.{position}", ATOM
             case t.Length(sequence=sequence):
-                return f"{self.style.name('length')}({self.show(sequence, _LOOSEST)})", ATOM
+                return f"length({self.show(sequence, _LOOSEST)})", ATOM
             case t.Arithmetic():
                 return self.arithmetic(term)
             case t.Negative(term=inner):
@@ -129,7 +192,7 @@ class _Printer:
                 left, right = self.style.sequence
                 return f"{left}{self.show(low, SUM)}{words['upto']}{self.show(high, SUM)}{right}", ATOM
             case t.SetTerm(items=items):
-                return self.style.braces(self.listed(items, SUM)), ATOM
+                return f"{{{self.listed(items, SUM)}}}", ATOM
             case t.Compare():
                 return self.chain((term,)), COMPARE
             case t.In(item=item, collection=collection):
@@ -169,31 +232,23 @@ class _Printer:
                 assert_never(term)
 
     def history(self, term: t.History) -> tuple[str, int]:
-        """``once[5 steps](F)``, ``F since G``; in words if the style has some."""
+        """``once[5 steps](F)``, ``F since G``."""
         if term.operator is t.Past.STEPS and term.limit is not None:
             told = {"==": "every", "<=": "at most"}[term.limit.relation]
-            length = f"{told} {show_number(term.limit.number)[0]} s"
-            said = self.style.phrases.get(t.Past.STEPS, f"{self.style.past(t.Past.STEPS)}({{limit}})")
-            return said.replace("{limit}", length), ATOM
+            return f"{term.operator}({told} {show_number(term.limit.number)[0]} s)", ATOM
         limit = "" if term.limit is None else self.limit(term.limit)
-        phrase = self.style.phrases.get(term.operator)
-        if phrase is not None:
-            shown = [self.show(each, COMPARE) for each in term.arguments]
-            limited = self.style.phrases.get(f"{term.operator} limited", phrase) if limit else phrase
-            return limited.format(*shown, limit=limit.strip("[]")), OR  # `not a for 3 steps` would be read both ways
-        name = self.style.past(term.operator)
         if term.operator in (t.Past.SINCE, t.Past.UNTIL):
             left, right = (self.show(each, NOT) for each in term.arguments)
-            return f"{left} {name}{limit} {right}", LASTING
+            return f"{left} {term.operator}{limit} {right}", LASTING
         if term.operator is t.Past.COUNTED:
             left, right = (self.show(each, NOT) for each in term.arguments)
-            return f"{name}({left} {self.style.past(t.Past.SINCE)} {right})", ATOM
+            return f"{term.operator}({left} {t.Past.SINCE} {right})", ATOM
         real = term.operator is t.Past.PREVIOUS and any(map(_shows_real, term.arguments))
-        return f"{name}{limit}({self.listed(term.arguments, _LOOSEST, real=real)})", ATOM
+        return f"{term.operator}{limit}({self.listed(term.arguments, _LOOSEST, real=real)})", ATOM
 
     def limit(self, limit: t.Limit) -> str:
         relation = self.style.words[limit.relation].strip() + " " if limit.relation else ""
-        return self.style.limit(f"{relation}{show_number(limit.number)[0]} {'steps' if limit.steps else 's'}")
+        return f"[{relation}{show_number(limit.number)[0]} {'steps' if limit.steps else 's'}]"
 
     def variable(self, term: t.Variable) -> str:
         """``in.r``; for another node, ``sensor.r`` (in RCL ``sensor.in.r``, which is never ambiguous)."""
@@ -216,7 +271,7 @@ class _Printer:
         if isinstance(value, bool):
             return self.style.words["TRUE" if value else "FALSE"], ATOM
         if isinstance(value, str):
-            return self.style.string(value), ATOM
+            return quote(value), ATOM
         fraction = Fraction(value)
         text, level = show_number(fraction)
         if term.sort == s.REAL and fraction.denominator == 1 and not real:
@@ -231,10 +286,10 @@ class _Printer:
         for i, argument in enumerate(arguments):
             real = i < len(parameters) and parameters[i] == s.REAL
             shown.append(self.show(argument, _LOOSEST, real=real))
-        return f"{name}({self.style.comma.join(shown)})"
+        return f"{name}({', '.join(shown)})"
 
     def listed(self, items: tuple[t.Term, ...], place: int, *, real: bool = False) -> str:
-        return self.style.comma.join(self.show(i, place, real=real) for i in items)
+        return ", ".join(self.show(i, place, real=real) for i in items)
 
     def arithmetic(self, term: t.Arithmetic) -> tuple[str, int]:
         level = OPERATORS[term.operator].level
@@ -246,7 +301,7 @@ class _Printer:
     def membership(self, item: t.Term, collection: t.Term, relation: str) -> str:
         shown = self.show(item, SUM)
         if isinstance(collection, t.SetTerm):
-            of = self.style.braces(self.listed(collection.items, SUM, real=_shows_real(item)))
+            of = f"{{{self.listed(collection.items, SUM, real=_shows_real(item))}}}"
         else:
             of = self.show(collection, SUM)
         return f"{shown}{self.style.words[relation]}{of}"
@@ -266,12 +321,11 @@ class _Printer:
         groups: list[tuple[list[str], s.Sort]] = []
         for variable in term.variables:
             if groups and groups[-1][1] == variable.sort:
-                groups[-1][0].append(self.style.name(variable.name))
+                groups[-1][0].append(variable.name)
             else:
-                groups.append(([self.style.name(variable.name)], variable.sort))
-        style_name = next(n for n, style in STYLES.items() if style is self.style)
+                groups.append(([variable.name], variable.sort))
         binders = ", ".join(
-            f"{', '.join(names)}{self.style.words['in']}{show_sort(sort, style_name)}" for names, sort in groups
+            f"{', '.join(names)}{self.style.words['in']}{show_sort(sort, self.name)}" for names, sort in groups
         )
         before, between, after = self.style.quantifiers[term.quantifier]
         text = f"{before}{binders}{between}{self.show(term.body, _LOOSEST)}{after}"

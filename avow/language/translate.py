@@ -1,4 +1,4 @@
-"""A contract in other notations: RCL again, plain words, Unicode mathematics, LaTeX, JSON.
+"""A contract in other notations: RCL again, Unicode mathematics, JSON.
 
 The caller adds further notations that need more than the language layer (SMT-LIB, a backend's own):
 `avow.cli.translate` holds the whole table. The JSON is a notation, too: the kind and sort of each node for other
@@ -8,8 +8,7 @@ programs, and formulas also as text. It is not read back.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Iterable, Iterator
-from functools import partial
+from collections.abc import Iterator
 from typing import Any
 
 from avow.base.codec import document, plain
@@ -21,8 +20,7 @@ from avow.language.lexer import quote
 from avow.language.load import check_text
 from avow.language.nodes import PARAMETER
 from avow.language.printer import show_sort, show_term, show_type
-from avow.language.sorts import BOOL, BUILTINS, Constructor
-from avow.language.styles import StyleName, latex_escape, latex_name
+from avow.language.sorts import BOOL, Constructor
 from avow.language.terms import Conditional, Literal, Term
 
 
@@ -114,15 +112,16 @@ def _topic(topic: Topic) -> str:
 # --- for people ------------------------------------------------------------------------------------------------------
 
 
-def _for_people(contract: Contract, style: StyleName) -> str:
+def to_unicode(contract: Contract) -> str:
+    """The contract in mathematical notation."""
     out: list[str] = []
     if contract.types:
         out.append("Types")
-        out += [f"  {name} : {show_type(sort, style)}" for name, sort in contract.types]
+        out += [f"  {name} : {show_type(sort, 'unicode')}" for name, sort in contract.types]
         out.append("")
     scalar = [(n, t) for n, t in contract.constants if n not in dict(contract.types)]
     if scalar:
-        out += ["Constants", *(f"  {name} = {show_term(term, style)}" for name, term in scalar), ""]
+        out += ["Constants", *(f"  {name} = {show_term(term)}" for name, term in scalar), ""]
     for node in contract.nodes:
         out.append(f"Node {node.name}")
         for word, ports in (("Inputs", node.inputs), ("Outputs", node.outputs)):
@@ -135,7 +134,7 @@ def _for_people(contract: Contract, style: StyleName) -> str:
                 out.append(f"  {word}")
             for clause in clauses:
                 out.append(f"    {clause.name}" + (f": {clause.sentence}" if clause.sentence else ""))
-                out.append(f"      {show_clause(clause, node, style)}")
+                out.append(f"      {show_clause(clause, node)}")
         out.append("")
     return "\n".join(out)
 
@@ -200,100 +199,3 @@ def _data(value: Any) -> Any:
     kind = {} if isinstance(value, Constructor) else {"kind": type(value).__name__.removesuffix("Sort").lower()}
     parts = [(field.name, getattr(value, field.name)) for field in dataclasses.fields(value) if field.name != "span"]
     return kind | {name: show_sort(part) if name == "sort" else _data(part) for name, part in parts}
-
-
-# --- as a LaTeX document ----------------------------------------------------------------------------------------------
-
-_HEAD = r"""\documentclass[a4paper]{article}
-\usepackage[T1]{fontenc}
-\usepackage[utf8]{inputenc}
-\usepackage{textcomp}
-\usepackage{amsmath,amssymb}
-\usepackage{array}
-\usepackage{longtable}
-\usepackage[margin=2cm]{geometry}
-\setlength{\parindent}{0pt}
-\setlength{\extrarowheight}{2pt}
-\begin{document}
-"""
-_TABLE = r"""
-\begin{longtable}{@{}>{\raggedright}p{0.15\textwidth}|l|>{\raggedright\arraybackslash}p{0.66\textwidth}@{}}
-"""
-_CONTEXT = r"\begin{longtable}[l]{@{}l@{\;}>{\raggedright\arraybackslash}p{0.75\textwidth}@{}}"
-
-
-def _to_latex(contract: Contract) -> str:
-    """A document: a table for each node as the paper prints them, with the English beside the formula.
-
-    It needs only Debian's texlive-latex-base and -recommended, and compiles for all names and sentences (tests compile
-    hostile ones).
-    """
-    return _HEAD + "\n".join([*_context(contract), *(_node_table(n) for n in contract.nodes)]) + "\\end{document}\n"
-
-
-def _context(contract: Contract) -> Iterable[str]:
-    types = dict(contract.types)
-    rows = [rf"${latex_name(name)}$ & ${{}}: {show_type(sort, 'latex')}$ \\" for name, sort in contract.types]
-    rows += [
-        rf"${latex_name(name)}$ & ${{}}= {show_term(term, 'latex')}$ \\"
-        for name, term in contract.constants
-        if name not in types
-    ]
-    if rows:
-        yield r"\textbf{Context}" + "\n\n" + _CONTEXT
-        yield "\n".join(rows)
-        yield "\\end{longtable}\n"
-
-
-def _node_table(node: Node) -> str:
-    rows = [rf"\multicolumn{{3}}{{c}}{{\textbf{{{latex_escape(node.name)}}}}} \\* \hline\hline"]
-    rows += _port_rows("Input", node.inputs)
-    rows += _port_rows("Output", node.outputs)
-    if node.topics:
-        shown = r" \newline ".join(
-            rf"\texttt{{{_breakable(t.ros_type)}}} {latex_escape(t.name)}"
-            + (rf" matches ${latex_name(f'{t.port.role}.{t.port.name}')}$" if t.port is not None else "")
-            for t in node.topics
-        )
-        rows.append(rf"Topics & & {shown} \\ \hline\hline")
-    rows += _clause_rows("Assume", node, node.assumptions)
-    rows += _clause_rows("Guarantee", node, node.guarantees)
-    return _TABLE + "\n".join(rows) + "\n\\end{longtable}\n"
-
-
-def _port_rows(word: str, ports: tuple[Port, ...]) -> Iterable[str]:
-    words = (r"\textbf{parameter} " if p.parameter else "" for p in ports)
-    names = (f"${latex_name(p.name)} : {_type(p)}$" + f" in {latex_escape(p.unit)}" * bool(p.unit) for p in ports)
-    shown = r",\quad ".join(map("".join, zip(words, names, strict=True))) or "none"
-    yield rf"{word} & \textbf{{FOL}} & {shown} \\ \hline\hline"
-
-
-def _type(port: Port) -> str:
-    is_declared = port.type_name.replace("_", "").isalnum() and port.type_name not in BUILTINS
-    return latex_name(port.type_name) if is_declared else show_type(port.sort, "latex")
-
-
-def _clause_rows(word: str, node: Node, clauses: tuple[Clause, ...]) -> Iterable[str]:
-    for clause in clauses:
-        label = rf"{word}\newline {_breakable(clause.name)}"
-        formula = rf"\textbf{{FOL}} & ${show_clause(clause, node, 'latex')}$ \\ \hline\hline"
-        if clause.sentence is None:
-            yield f"{label} & {formula}"
-        else:
-            yield rf"{label} & \textbf{{Text}} & {latex_escape(clause.sentence)} \\* \cline{{2-3}}"
-            yield f" & {formula}"
-
-
-def _breakable(text: str) -> str:
-    """Text with allowed line breaks after each underscore and slash."""
-    return latex_escape(text).replace(r"\_", r"\_\allowbreak{}").replace("/", r"/\allowbreak{}")
-
-
-FORMATS: dict[str, Callable[[Contract], str]] = {
-    "rcl": to_rcl,
-    "text": partial(_for_people, style="text"),
-    "unicode": partial(_for_people, style="unicode"),
-    "latex": _to_latex,
-    "json": to_json,
-}
-"""The notations of this layer."""

@@ -82,9 +82,7 @@ INSTEAD = {
     "avow audit --sign release.key": f"{KEYED} && avow audit --sign my.key",
     "avow audit --key release.key.pub": f"{KEYED} && avow audit --sign my.key && avow audit --key my.key.pub",
     "avow check --explain": "avow check thermostat --explain",
-    "avow compose PATH --latex | --json | --rcl": " && ".join(
-        f"{COMPOSED} {flag}" for flag in ("--latex", "--json", "--rcl")
-    ),
+    "avow compose PATH --json | --rcl": " && ".join(f"{COMPOSED} {flag}" for flag in ("--json", "--rcl")),
     "avow explain HASH": """kept=$(tail -1 artifacts/ledger/thermostat.jsonl | grep -o '"hash":"[0-9a-f]*')"""
     " && avow explain ${kept#*:?}",
     "avow diff v1.2": "avow diff reports/thermostat",

@@ -21,7 +21,8 @@ from avow.formulas.formula import node_digest
 from avow.language import format as layout
 from avow.language.contract import Contract
 from avow.language.load import check_text, parse_formula
-from avow.language.translate import FORMATS
+from avow.language.translate import to_json as contract_to_json
+from avow.language.translate import to_rcl, to_unicode
 from avow.solving.smtlib import to_smtlib
 
 from .test_printer import LOADED, NODE
@@ -114,9 +115,9 @@ def _accepted(contract: Contract, formatted: str) -> None:
     assert again == contract
     assert _digests(again) == _digests(contract)
     with contextlib.suppress(Rejected):
-        assert check_text(FORMATS["rcl"](contract), "f")[0] == contract
-    for style in ("text", "unicode", "latex", "json"):
-        assert FORMATS[style](contract).encode("utf-8", "surrogatepass")
+        assert check_text(to_rcl(contract), "f")[0] == contract
+    for translate in (to_unicode, contract_to_json):
+        assert translate(contract).encode("utf-8", "surrogatepass")
     found = to_smtlib(contract)
     assert bool(found.text) or bool(found.missing) or not any(node.clauses for node in contract.nodes)
 

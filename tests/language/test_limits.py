@@ -13,7 +13,7 @@ from avow.language.format import format_text
 from avow.language.load import check_text
 from avow.language.sorts import REAL, DataSort, SequenceSort, TupleSort
 from avow.language.subterms import sort_extent, term_extent
-from avow.language.translate import FORMATS
+from avow.language.translate import to_json, to_unicode
 
 NODE = "node n { inputs( i : %s ) outputs( o : BOOL ) topics() guarantee( %s ) }"
 
@@ -96,8 +96,8 @@ def test_what_is_as_deep_as_may_be_breaks_nothing(formula: str) -> None:
     contract, found = check_text(text, "f")
     assert contract is not None, [d.message for d in found if d.is_error]
     assert check_text(format_text(text, "f"), "f")[0] == contract
-    for style in ("text", "unicode", "latex", "json"):
-        assert FORMATS[style](contract)
+    assert to_unicode(contract)
+    assert to_json(contract)
     assert node_digest(contract.nodes[0], contract.nodes[0].guarantees[0])
     assert hash(contract.nodes[0].guarantees[0].formula)
 

@@ -7,7 +7,7 @@ from drawn.contracts import Strange
 
 from avow.language.contract import Contract
 from avow.language.load import check_text
-from avow.language.translate import FORMATS
+from avow.language.translate import to_rcl
 from avow.solving.smtlib import to_smtlib
 
 
@@ -52,7 +52,7 @@ def test_a_variable_over_tuples_takes_each_value(collection: str) -> None:
 def test_constants_that_are_formulas_read_back() -> None:
     text = "context { A = (1 < 2); B = (not TRUE); C = (A -> B); D = <(1 < 2), FALSE>; E = ((1 < 2), 3); }"
     contract = contract_of(text + " node n { inputs() outputs( b : BOOL ) topics() guarantee( out.b <=> C ) }")
-    assert contract_of(FORMATS["rcl"](contract)).constants == contract.constants
+    assert contract_of(to_rcl(contract)).constants == contract.constants
 
 
 @pytest.mark.parametrize(

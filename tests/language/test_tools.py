@@ -188,7 +188,7 @@ def test_fmt_reports_in_order_and_nothing_after_an_open_comment(tmp_path: Path) 
     assert [line.strip()[-3:] for line in invoke("fmt", str(path))[1].splitlines() if "-->" in line] == ["1:8", ":16"]
 
 
-@pytest.mark.parametrize("notation", ["rcl", "text", "unicode", "latex", "json"])
+@pytest.mark.parametrize("notation", ["rcl", "unicode", "json"])
 def test_translate(files: dict[str, str], tmp_path: Path, notation: str) -> None:
     code, output = invoke("translate", files["good"], "--to", notation)
     assert code == 0

@@ -1,10 +1,8 @@
-"""avow translate: RCL reads back as the equal contract, LaTeX compiles, SMT-LIB is accepted by Z3 and cvc5."""
+"""avow translate: RCL reads back as the equal contract, SMT-LIB is accepted by Z3 and cvc5."""
 
 from __future__ import annotations
 
 import json
-import shutil
-import subprocess
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,7 +12,7 @@ from drawn.contracts import CONTRACT
 from avow.base.diagnostics import Rejected
 from avow.language.contract import Contract
 from avow.language.load import check_text, load_contract
-from avow.language.translate import FORMATS
+from avow.language.translate import to_json, to_rcl, to_unicode
 
 HOSTILE = r"""
 context { T_x' : {a_b, c'd, e''}; F : {u, v} x (REAL, <T_x'>) --> REAL x REAL;
@@ -43,7 +41,7 @@ def contracts(root: Path) -> list[Contract]:
 
 def test_rcl_reads_back(root: Path) -> None:
     for contract in contracts(root):
-        text = FORMATS["rcl"](contract)
+        text = to_rcl(contract)
         again, found = check_text(text, "again.rcl")
         assert again is not None, (text, [f"{d.span} {d.message}" for d in found if d.is_error])
         assert replace(again, files=contract.files) == contract
@@ -52,7 +50,7 @@ def test_rcl_reads_back(root: Path) -> None:
 
 def test_json_is_complete(root: Path) -> None:
     for contract in contracts(root):
-        data = json.loads(FORMATS["json"](contract))
+        data = json.loads(to_json(contract))
         assert [n["name"] for n in data["nodes"]] == [n.name for n in contract.nodes]
         for node, shown in zip(contract.nodes, data["nodes"], strict=True):
             assert [c["name"] for c in shown["guarantees"]] == [c.name for c in node.guarantees]
@@ -61,29 +59,9 @@ def test_json_is_complete(root: Path) -> None:
 
 def test_words_and_signs(root: Path) -> None:
     contract = load_contract([root / "contracts" / "remote_inspection_published" / "system.rcl"])
-    unicode = FORMATS["unicode"](contract)
+    unicode = to_unicode(contract)
     assert "WayP : ℝ × ℝ → ℕ" in unicode
     assert "∃! x, y ∈ ℝ · out.position(x, y)" in unicode
-    assert "for exactly one x, y in reals: out.position(x, y)" in FORMATS["text"](contract)
-
-
-@pytest.mark.needs_latex
-def test_latex_compiles(root: Path, tmp_path: Path) -> None:
-    pdflatex = shutil.which("pdflatex")
-    assert pdflatex is not None
-    for i, contract in enumerate(contracts(root)):
-        (tmp_path / f"c{i}.tex").write_text(FORMATS["latex"](contract), "utf-8")
-        command = [pdflatex, "-halt-on-error", "-interaction=nonstopmode", "-no-shell-escape", f"c{i}.tex"]
-        done = subprocess.run(command, cwd=tmp_path, capture_output=True, timeout=120, check=False)
-        assert done.returncode == 0, done.stdout.decode("latin-1")[-3000:]
-        assert (tmp_path / f"c{i}.pdf").stat().st_size > 1000
-
-
-def test_latex_is_escaped(root: Path) -> None:
-    text = FORMATS["latex"](contracts(root)[1])
-    assert r"100 \% of \textbackslash{}section\{x\} \& \$y\$ \#1 \_ \textasciicircum{} \textasciitilde{}" in text
-    assert r"\end{x}" not in text
-    assert "🤖" not in text
 
 
 def test_smtlib_is_accepted_by_z3(root: Path) -> None:
@@ -125,8 +103,8 @@ def test_an_element_that_a_port_hides_is_an_error_of_the_translation() -> None:
         contract = check_text(text % (name, sign), "f")[0]
         assert contract is not None
         if sound:
-            assert check_text(FORMATS["rcl"](contract), "f")[0] == contract
+            assert check_text(to_rcl(contract), "f")[0] == contract
             continue
         with pytest.raises(Rejected) as refused:
-            FORMATS["rcl"](contract)
+            to_rcl(contract)
         assert [d.code for d in refused.value.diagnostics] == ["RCL202"]
