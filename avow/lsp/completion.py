@@ -1,4 +1,4 @@
-"""The completions at a place of a contract, and the arguments of an operator or function.
+"""The completions at a place of a contract.
 
 It is based on words, so that it works while a text is being typed.
 """
@@ -6,16 +6,14 @@ It is based on words, so that it works while a text is being typed.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
-from itertools import pairwise
+from dataclasses import dataclass
 
-from avow.language import parser
 from avow.language.contract import Contract, Definition, Node, Port
 from avow.language.lexer import LONG_UNITS, STEPS, UNITS, Token
 from avow.language.nodes import ROS_BUILTINS
 from avow.language.printer import show_sort, show_term, show_type
 from avow.language.scope import of_contract
-from avow.language.sorts import BoolSort, DataSort, EnumSort, FunctionSort, SequenceSort, Sort, TupleSort, components
+from avow.language.sorts import BoolSort, DataSort, EnumSort, Sort, TupleSort, components
 from avow.language.terms import Past, Role
 from avow.lsp.names import Text
 from avow.lsp.vocabulary import BUILTIN_TYPES, CONNECTIVES, CONTEXT, FORMS, NODE, QUANTIFIERS, SECTIONS
@@ -33,49 +31,38 @@ class Offer:
     about: str = ""
 
 
-@dataclass(frozen=True, slots=True)
-class Signature:
-    """How an operator or function is applied, and which of its arguments contains the place."""
-
-    label: str
-    parameters: tuple[str, ...]
-    active: int
-    about: str = ""
-
-
 # --- where an offset is, by words, so that it is known while a text is being typed ------------------------------------
 
 _TOP = ("CONTEXT", "NODE")
-_SECTIONS = ("INPUTS", "OUTPUTS", "TOPICS", "STEPS", "DEFINE", "ASSUME", "GUARANTEE")
-_WORDS = {"A": "ASSUME", "G": "GUARANTEE"}
+_SECTIONS = ("INPUTS", "OUTPUTS", "TOPICS", "DEFINE", "ASSUME", "GUARANTEE")
+_WORDS = {"A": "ASSUME", "G": "GUARANTEE", "steps": "STEPS"}
 
 
 @dataclass(frozen=True, slots=True)
 class _Place:
     """`top` is ``CONTEXT``, ``NODE`` or empty; `section` the part of a node, empty between its parts. `before` are the
-    words of the part up to the offset, without the one being typed; `bound` the variables of the quantifiers around."""
+    words of the part up to the offset, without the one being typed."""
 
     top: str = ""
     node: str = ""
     section: str = ""
-    before: tuple[Token, ...] = ()
-    bound: tuple[str, ...] = ()
+    before: Sequence[Token] = ()
 
     @property
     def last(self) -> str:
         """The kind of the word before; empty if there is none."""
         return self.before[-1].type if self.before else ""
 
-    @property
-    def defines(self) -> bool:
-        """Whether it is in a definition."""
-        return self.section == "DEFINE" or any(t.type == "DEFINE" for t in self.before)
+    def has(self, kind: str) -> bool:
+        """Whether there is such a word before."""
+        return any(token.type == kind for token in self.before)
 
     @property
-    def parameters(self) -> tuple[str, ...]:
-        """The parameters of a definition."""
-        pairs = pairwise(self.before) if self.defines else ()
-        return tuple(t.text for t, then in pairs if t.type == "NAME" and then.type in ("COLON", "COMMA"))
+    def bound(self) -> tuple[str, ...]:
+        """The variables that quantifiers before bind, and the parameters of a definition."""
+        found = zip(self.before, self.before[1:], self.before[2:], strict=False)
+        begins, ends = ("LPAR", "COMMA"), ("COMMA", "IN", "COLON")
+        return tuple(t.text for a, t, z in found if t.type == "NAME" and a.type in begins and z.type in ends)
 
 
 def _place_of(text: Text, offset: int) -> _Place | None:
@@ -87,67 +74,39 @@ def _place_of(text: Text, offset: int) -> _Place | None:
     if any(t.type == "STRING" and t.start < offset < t.end for t in text.tokens):
         return None
     before = [t for t in text.tokens if t.end < offset or (t.end == offset and not t.text[:1].isidentifier())]
-    return _scan([t for t in before if t.start < offset])
+    top = max((k for k, token in enumerate(before) if token.type in _TOP), default=None)
+    return _Place() if top is None else _inside(before[top].type, before[top + 1 :])
 
 
-def _scan(found: Sequence[Token]) -> _Place:
-    top, node, section, start, depth, brace, opened = "", "", "", 0, 0, 0, False
-    for at, token in enumerate(found):
-        kind = token.type
-        between = depth == 0 and (not section or opened)
-        if kind == "NAME" and top == "NODE" and brace and between and token.text in _WORDS:
-            kind = _WORDS[token.text]
-        if kind == "NAME" and token.text == Past.STEPS and top == "NODE" and brace and between:
-            kind = "STEPS"
-        if kind in _TOP:
-            top, node, section, start, depth, brace, opened = kind, "", "", at + 1, 0, 0, False
-        elif kind in _SECTIONS and (kind, top) != ("DEFINE", "CONTEXT"):
-            section, start, depth, opened = kind, at + 1, 0, False
-        elif kind == "LPAR":
-            depth, opened = depth + 1, section != "DEFINE"
-        elif kind == "RPAR":
-            depth = max(depth - 1, 0)
-        elif kind == "LBRACE" and depth == 0:
-            brace += 1
-        elif kind == "RBRACE" and depth == 0:
-            brace = max(brace - 1, 0)
-            if brace == 0:
-                top, node, section, start, opened = "", "", "", at + 1, False
-        elif kind == "NAME" and top == "NODE" and not brace and not node:
-            node = token.text
-        elif kind == "SEMICOLON" and depth == 0 and (top == "CONTEXT" or section == "DEFINE"):
-            section, start = "", at + 1
-    if section and opened and depth == 0:
-        section, start = "", len(found)
-    elif section and not opened and section != "DEFINE":
-        section = "HEAD"
-    elif top == "NODE" and not section:
-        section = "" if brace else "HEAD"
-    part = tuple(found[start:])
-    return _Place(top, node, section, part, _bound(part))
+def _inside(top: str, found: Sequence[Token]) -> _Place:
+    """The place after a context's or node's first word and these words."""
+    brace = next((k for k, token in enumerate(found) if token.type == "LBRACE"), None)
+    if brace is None:
+        return _Place(top, section="HEAD")
+    if _open(found, "LBRACE", "RBRACE") <= 0:
+        return _Place()
+    node = found[0].text if top == "NODE" else ""
+    body = found[brace + 1 :]
+    if top == "CONTEXT":
+        start = max((k + 1 for k, token in enumerate(body) if token.type == "SEMICOLON"), default=0)
+        return _Place(top, node, "DECLARATION", body[start:])
+    start, section = -1, ""
+    for k, token in enumerate(body):
+        if token.type in _SECTIONS:
+            start, section = k, token.type
+        elif token.text in _WORDS and body[k - 1].type in ("RPAR", "SEMICOLON"):
+            start, section = k, _WORDS[token.text]
+    part = body[start + 1 :]
+    closed = part[-1:] and part[-1].type == ("SEMICOLON" if section == "DEFINE" else "RPAR")
+    if closed and _open(part, "LPAR", "RPAR") <= 0:
+        return _Place(top, node)
+    begun = section in ("", "DEFINE") or any(token.type == "LPAR" for token in part)
+    return _Place(top, node, section if begun else "HEAD", part)
 
 
-def _bound(part: Sequence[Token]) -> tuple[str, ...]:
-    """The variables of the quantifiers that are open at the end of a part."""
-    open_: list[tuple[int, list[str], bool]] = []
-    depth = 0
-    for at, token in enumerate(part):
-        if token.type == "LPAR":
-            depth += 1
-            if at and part[at - 1].type in parser.QUANTIFIERS:
-                open_.append((depth, [], True))
-        elif token.type == "RPAR":
-            depth -= 1
-            while open_ and open_[-1][0] > depth:
-                open_.pop()
-        elif open_ and open_[-1][0] == depth and open_[-1][2]:
-            if token.type in ("BAR", "SEMICOLON"):
-                open_[-1] = (depth, open_[-1][1], False)
-            elif token.type == "NAME" and part[at - 1].type in ("LPAR", "COMMA"):
-                following = part[at + 1].type if at + 1 < len(part) else ""
-                if following in ("COMMA", "IN"):
-                    open_[-1][1].append(token.text)
-    return tuple(name for _, names, _ in open_ for name in names)
+def _open(found: Sequence[Token], opening: str, closing: str) -> int:
+    """The number of brackets that are open at the end."""
+    return sum((token.type == opening) - (token.type == closing) for token in found)
 
 
 # --- contracts --------------------------------------------------------------------------------------------------------
@@ -171,28 +130,20 @@ def _offers(place: _Place, contract: Contract) -> Iterator[Offer]:
             yield Offer("node", "Keyword", "a node's contract", NODE)
             yield Offer("context", "Keyword", "types and constants", CONTEXT)
         case "CONTEXT", _:
-            if place.defines and any(t.type == "EQUALS" for t in place.before):
-                yield from _of_formula(place, node, contract)
-            elif place.last == "COLON" or any(t.type == "COLON" for t in place.before):
+            if place.has("EQUALS"):
+                yield from _of_formula(place, node, contract) if place.has("DEFINE") else _values(contract)
+            elif place.has("COLON"):
                 yield from _types(contract)
-            elif any(t.type == "EQUALS" for t in place.before):
-                yield from _values(contract)
         case "NODE", "":
             for word, (template, detail) in SECTIONS.items():
                 yield Offer(word, "Keyword", detail, template)
         case "NODE", "INPUTS" | "OUTPUTS":
-            if any(t.type == "COLON" for t in place.before):
+            if place.has("COLON"):
                 yield from _types(contract)
-        case "NODE", "STEPS":
-            if place.last == "NUMBER":
-                yield from (Offer(unit, "Unit") for unit in (*UNITS, *LONG_UNITS))
-            elif place.last == "LPAR":
-                yield Offer("every", "Keyword", "exactly so far apart")
-                yield Offer("at most", "Keyword", "no further apart")
         case "NODE", "TOPICS":
             yield from _of_topic(place, node)
         case "NODE", "DEFINE":
-            if any(t.type == "EQUALS" for t in place.before):
+            if place.has("EQUALS"):
                 yield from _of_formula(place, node, contract)
             elif place.last == "COLON":
                 yield from _types(contract)
@@ -232,8 +183,7 @@ def _of_formula(place: _Place, node: Node | None, contract: Contract) -> Iterato
         yield from _of_sort(sort, node, contract)
         if isinstance(sort, EnumSort | DataSort | BoolSort):
             return
-    yield from (Offer(name, "Variable", "quantified") for name in place.bound)
-    yield from (Offer(name, "Variable", "a parameter") for name in place.parameters)
+    yield from (Offer(name, "Variable", "a variable") for name in place.bound)
     for role in (Role.INPUT, Role.OUTPUT):
         yield from _ports(node, role, f"{role}.")
     yield from _values(contract)
@@ -318,73 +268,3 @@ def _values(contract: Contract) -> Iterator[Offer]:
         stops = ", ".join(f"${{{k}:{show_sort(p)}}}" for k, p in enumerate(parameters, 1))
         yield Offer(name, "EnumMember", f"an element of {sort.name}", f"{name}({stops})" if parameters else "")
     yield from (Offer(name, "Constant", show_term(term, "rcl")) for name, term in contract.constants)
-
-
-# --- signatures ------------------------------------------------------------------------------------------------------
-
-
-def signature(text: Text, contract: Contract, offset: int) -> Signature | None:
-    """How the operator or function before the innermost open parenthesis is applied."""
-    place = _place_of(text, offset)
-    inside = place is not None and (place.section in ("ASSUME", "GUARANTEE") or place.defines)
-    if place is None or not inside:
-        return None
-    commas, closed = 0, 0
-    for at in range(len(place.before) - 1, 0, -1):
-        kind = place.before[at].type
-        if kind in ("RPAR", "RBRACE", "RSQUARE"):
-            closed += 1
-        elif kind in ("LPAR", "LBRACE", "LSQUARE") and closed:
-            closed -= 1
-        elif kind == "LPAR":
-            return _of_head(place, at, contract, commas)
-        elif kind == "COMMA" and not closed:
-            commas += 1
-    return None
-
-
-def _of_head(place: _Place, opening: int, contract: Contract, active: int) -> Signature | None:
-    at = opening - 1
-    if place.before[at].type == "RSQUARE":
-        while at > 0 and place.before[at].type != "LSQUARE":
-            at -= 1
-        at -= 1
-    name = place.before[at]
-    if name.text in QUANTIFIERS:
-        label = f"{name.text}(x in S | F)"
-        bar = any(t.type in ("BAR", "SEMICOLON") for t in place.before[opening:])
-        return Signature(label, ("x in S", "F"), int(bar), QUANTIFIERS[name.text])
-    if name.type != "NAME":
-        return None
-    role = place.before[at - 2].text if at > 1 and place.before[at - 1].type == "DOT" else None
-    found = _applied(place, name.text, role, contract)
-    if found is None and name.text in FORMS and role is None:
-        form = FORMS[name.text]
-        found = Signature(form.label, form.parameters, 0, form.meaning)
-    return replace(found, active=min(active, max(len(found.parameters) - 1, 0))) if found is not None else None
-
-
-def _applied(place: _Place, name: str, role: str | None, contract: Contract) -> Signature | None:
-    """A port or constructor of the contract."""
-    node = next((n for n in contract.nodes if n.name == place.node), None)
-    ports: list[Port] = [p for p in (*node.inputs, *node.outputs) if p.name == name] if node is not None else []
-    for port in ports:
-        if role is not None and port.role != role:
-            continue
-        match port.sort:
-            case FunctionSort(parameters=parameters, result=result):
-                shown = tuple(map(show_sort, parameters))
-                return Signature(f"{name}({', '.join(shown)})", shown, 0, f"→ {show_sort(result)}")
-            case SequenceSort(item=item):
-                return Signature(f"{name}(i)", ("i",), 0, f"the element at position i, from 0: {show_sort(item)}")
-            case _:  # takes no arguments
-                pass
-    for definition in _definitions(node, contract):
-        if role is None and definition.name == name and definition.parameters:
-            shown = tuple(f"{p.name} : {show_sort(p.sort)}" for p in definition.parameters)
-            return Signature(f"{name}({', '.join(shown)})", shown, 0, definition.text)
-    sort = of_contract(contract).elements.get(name)
-    if role is None and isinstance(sort, DataSort) and (parameters := sort.constructor(name).parameters):
-        shown = tuple(map(show_sort, parameters))
-        return Signature(f"{name}({', '.join(shown)})", shown, 0, f"an element of {sort.name}")
-    return None

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,8 +12,7 @@ from avow.base.diagnostics import Diagnostic, Severity, Span
 from avow.language.contract import ClauseKind
 from avow.language.source import Source
 from avow.language.syntax import ConstantDeclaration, Declaration, Define, TypeDeclaration
-from avow.lsp.appearance import MODIFIERS, TOKEN_TYPES, Coloured
-from avow.lsp.completion import Offer, Signature
+from avow.lsp.completion import Offer
 from avow.lsp.features import Document
 from avow.lsp.names import clause_names
 from avow.sanity.document import Result
@@ -141,34 +140,3 @@ def completion_item(offer: Offer, number: int, snippets: bool) -> types.Completi
         insert_text_format=types.InsertTextFormat.Snippet if template else types.InsertTextFormat.PlainText,
         sort_text=f"{number:04}",
     )
-
-
-def signature_help(found: Signature) -> types.SignatureHelp:
-    """Each parameter as the stretch of the label that contains it."""
-    parameters, at = [], found.label.find("(") + 1
-    for name in found.parameters:
-        start = max(found.label.find(name, at), 0)
-        at = start + len(name)
-        parameters.append(types.ParameterInformation((units(found.label[:start]), units(found.label[:at]))))
-    shown = types.SignatureInformation(found.label, found.about or None, parameters, found.active)
-    return types.SignatureHelp([shown], 0, found.active)
-
-
-def semantic_tokens(found: Sequence[Coloured], lines: Lines) -> types.SemanticTokens:
-    """The protocol's five numbers for each stretch, each position relative to the previous one."""
-    return types.SemanticTokens(list(_numbers(found, lines)))
-
-
-def _numbers(found: Sequence[Coloured], lines: Lines) -> Iterator[int]:
-    line = column = 0
-    for each in found:
-        place = lines.position(each.start)
-        yield place.line - line
-        yield place.character - column if place.line == line else place.character
-        yield units(lines.text[each.start : each.end])
-        yield TOKEN_TYPES.index(each.kind)
-        yield sum(1 << MODIFIERS.index(modifier) for modifier in each.modifiers)
-        line, column = place.line, place.character
-
-
-LEGEND = types.SemanticTokensLegend(list(TOKEN_TYPES), list(MODIFIERS))

@@ -7,17 +7,12 @@ one thing to a system (they link, or the environment gives them one value), so t
 
 from __future__ import annotations
 
-import re
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import islice
-from pathlib import Path
 from typing import Any
 
 from avow.base.diagnostics import Diagnostic
-from avow.base.files import read_text
-from avow.base.tuning.running import BYTES_LOOKED_THROUGH, FILES_LOOKED_THROUGH, LINES_NAMED
 from avow.formulas.formula import digest
 from avow.language.contract import Contract
 from avow.language.lexer import KEYWORDS, LIMITED
@@ -27,7 +22,6 @@ from avow.language.terms import Builtin, Past
 from avow.lsp.names import OWNED, PORTS, Meaning, Occurrence, What, occurrences, taken_apart
 from avow.lsp.plan_names import PlanText, plan_occurrences
 from avow.lsp.project import Project, faults_of_plan
-from avow.system.load import PLAN_FILE
 
 _WORDS = {*KEYWORDS, *LIMITED, *Builtin, *Past, "length", "indices"}
 """Words of the language, including operators that a name may shadow: such a name would have two readings."""
@@ -83,37 +77,6 @@ def rename(project: Project, meaning: Meaning, new: str) -> tuple[Edit, ...]:
         raise Refused(f"`{new}` does not do here: {wrong[0].message}")
     _compare(project, after, before, meaning, new)
     return edits
-
-
-def elsewhere(project: Project, meaning: Meaning) -> tuple[str, ...]:
-    """Where else the name occurs as a word: lines of the plan, other files of the system's folder (programs, tables,
-    traces), plans beside it that refer to this system. Its meaning there is not known here."""
-    if project.plan is None or meaning.what is What.VARIABLE:
-        return ()
-    folder, word = Path(project.plan.file).parent, re.compile(rf"(?<!\w){re.escape(meaning.name)}(?!\w)")
-    known = {Path(project.plan.file).resolve(), *(Path(s.file).resolve() for s in project.sources)}
-    lines, starts = (
-        Source("", project.plan.text),
-        {o.start for o in all_occurrences(project) if o.file == project.plan.file},
-    )
-    left = (m.start() for m in word.finditer(project.plan.text) if m.start() not in starts)
-    found = [f"{PLAN_FILE}:{line}" for line in sorted({lines.place(at)[0] for at in left})[:LINES_NAMED]]
-    for path in folder.parent.glob(f"*/{PLAN_FILE}"):
-        try:
-            text = read_text(path, "utf-8") if path.parent.resolve() != folder.resolve() else ""
-        except (OSError, UnicodeError):
-            continue  # not text
-        if folder.resolve().name in text and word.search(text):
-            found.append(f"../{path.parent.name}/{PLAN_FILE}")
-    for path in islice(sorted(folder.rglob("*")), FILES_LOOKED_THROUGH):
-        try:
-            if path.is_symlink() or not path.is_file() or path.resolve() in known:
-                continue
-            if path.stat().st_size <= BYTES_LOOKED_THROUGH and word.search(read_text(path, "utf-8")):
-                found.append(str(path.relative_to(folder)))
-        except (OSError, UnicodeError):
-            continue  # not text
-    return tuple(found)
 
 
 def _check_name(new: str) -> None:

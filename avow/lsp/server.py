@@ -19,9 +19,8 @@ from avow.base.tuning.running import CHARACTERS_PER_SECOND, NOTICED_SECONDS, SAN
 from avow.language.format import format_text
 from avow.language.load import check_in_part, clean_text
 from avow.lsp import features, protocol
-from avow.lsp.appearance import coloured, folds
 from avow.lsp.background import Asked, askable, is_bad
-from avow.lsp.completion import offers, signature
+from avow.lsp.completion import offers
 from avow.lsp.features import Document, StatusLookup
 from avow.lsp.names import CLAUSES, Occurrence, What
 from avow.lsp.plan_keys import about_key, plan_offers
@@ -29,7 +28,7 @@ from avow.lsp.plan_names import PlanText
 from avow.lsp.project import faults_of_plan, file_of, is_plan
 from avow.lsp.protocol import Lines
 from avow.lsp.quick_fixes import fixes
-from avow.lsp.renaming import Edit, Refused, elsewhere, is_renameable, rename
+from avow.lsp.renaming import Edit, Refused, is_renameable, rename
 from avow.sanity.document import Result
 
 
@@ -229,9 +228,6 @@ class Server:
         changes: dict[str, list[types.TextEdit]] = {}
         for edit, (uri, place) in zip(edits, self.places(document, edits), strict=True):
             changes.setdefault(uri, []).append(types.TextEdit(place, edit.text))
-        if left := elsewhere(document.project, name.meaning):
-            told = f"`{name.meaning.name}` also stands in {', '.join(left)}: avow does not change these"
-            self.server.window_show_message(types.ShowMessageParams(types.MessageType.Warning, told))
         return types.WorkspaceEdit(changes)
 
     def completion(self, document: Document, lines: Lines, params: types.CompletionParams) -> types.CompletionList:
@@ -243,12 +239,6 @@ class Server:
         snippets = _takes_snippets(self.server.client_capabilities)
         items = [protocol.completion_item(offer, k, snippets) for k, offer in enumerate(found)]
         return types.CompletionList(is_incomplete=False, items=items)
-
-    def signature_help(
-        self, document: Document, lines: Lines, params: types.SignatureHelpParams
-    ) -> types.SignatureHelp | None:
-        found = signature(document.taken_apart, document.project.contract, lines.offset(params.position))
-        return protocol.signature_help(found) if found is not None else None
 
     def code_actions(self, document: Document, lines: Lines, params: types.CodeActionParams) -> list[types.CodeAction]:
         if not document.project.sources:
@@ -281,13 +271,6 @@ class Server:
 
     def outline(self, document: Document, lines: Lines, _: types.DocumentSymbolParams) -> list[types.DocumentSymbol]:
         return protocol.outline(document, lines)
-
-    def folding(self, document: Document, lines: Lines, _: types.FoldingRangeParams) -> list[types.FoldingRange]:
-        places = (lines.range(*place) for place in folds(document.taken_apart))
-        return [types.FoldingRange(p.start.line, p.end.line, kind=types.FoldingRangeKind.Region) for p in places]
-
-    def semantic_tokens(self, document: Document, lines: Lines, _: types.SemanticTokensParams) -> types.SemanticTokens:
-        return protocol.semantic_tokens(coloured(document.taken_apart, document.names), lines)
 
     def formatting(self, document: Document, lines: Lines, _: types.DocumentFormattingParams) -> list[types.TextEdit]:
         if is_plan(document.file):
@@ -346,18 +329,11 @@ def _make_server(status: Callable[[str], StatusLookup] = _nothing) -> LanguageSe
         (types.TEXT_DOCUMENT_RENAME, server.rename, types.RenameOptions(prepare_provider=True)),
         (types.TEXT_DOCUMENT_COMPLETION, server.completion, types.CompletionOptions(trigger_characters=[".", "="])),
         (
-            types.TEXT_DOCUMENT_SIGNATURE_HELP,
-            server.signature_help,
-            types.SignatureHelpOptions(trigger_characters=["(", ","]),
-        ),
-        (
             types.TEXT_DOCUMENT_CODE_ACTION,
             server.code_actions,
             types.CodeActionOptions(code_action_kinds=[types.CodeActionKind.QuickFix]),
         ),
         (types.TEXT_DOCUMENT_DOCUMENT_SYMBOL, server.outline, None),
-        (types.TEXT_DOCUMENT_FOLDING_RANGE, server.folding, None),
-        (types.TEXT_DOCUMENT_SEMANTIC_TOKENS_FULL, server.semantic_tokens, protocol.LEGEND),
         (types.TEXT_DOCUMENT_INLAY_HINT, server.inlay_hints, None),
         (types.TEXT_DOCUMENT_FORMATTING, server.formatting, None),
     )

@@ -26,7 +26,6 @@ class Editor:
         self.loop = asyncio.new_event_loop()
         self.client = LanguageClient("tests", "1")
         self.published: dict[str, list[types.Diagnostic]] = {}
-        self.told: list[str] = []
         self.refreshed = 0
         self.news = asyncio.Event()
         self.versions: dict[str, int] = {}
@@ -40,10 +39,6 @@ class Editor:
         def _(_params: None) -> None:
             self.refreshed += 1
             self.news.set()
-
-        @self.client.feature(types.WINDOW_SHOW_MESSAGE)
-        def _(params: types.ShowMessageParams) -> None:
-            self.told.append(params.message)
 
     def wait(self, what: Coroutine[Any, Any, Any]) -> Any:
         return self.loop.run_until_complete(asyncio.wait_for(what, PATIENCE))

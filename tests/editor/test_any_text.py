@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import random
-from itertools import pairwise
 
 import pytest
 
@@ -11,12 +10,11 @@ pytest.importorskip("pygls")
 
 from editor.test_client import CONTRACT, PLAN
 
-from avow.lsp.appearance import MODIFIERS, TOKEN_TYPES, coloured, folds
-from avow.lsp.completion import offers, signature
+from avow.lsp.completion import offers
 from avow.lsp.features import Document, analyse, definition, hover, name_at, references
 from avow.lsp.plan_keys import about_key, plan_offers
 from avow.lsp.plan_names import PlanText, plan_occurrences
-from avow.lsp.protocol import Lines, outline, semantic_tokens, signature_help
+from avow.lsp.protocol import Lines, outline
 from avow.lsp.renaming import renamed_with
 
 PIECES = (
@@ -72,11 +70,6 @@ def texts(count: int) -> list[str]:
 def check(document: Document, places: range) -> None:
     lines = Lines(document.text)
     part = document.taken_apart
-    colours = coloured(part, document.names)
-    assert all(one.end <= other.start for one, other in pairwise(colours))
-    assert all(c.kind in TOKEN_TYPES and set(c.modifiers) <= set(MODIFIERS) for c in colours)
-    assert all(number >= 0 for number in semantic_tokens(colours, lines).data)
-    assert all(0 <= start < end <= len(document.text) for start, end in folds(part))
     outline(document, lines)
     for one in document.names:
         assert not one.written or document.text[one.start : one.end] == one.meaning.name
@@ -84,10 +77,6 @@ def check(document: Document, places: range) -> None:
         assert lines.offset(lines.position(offset)) == offset
         found = offers(part, document.project.contract, offset)
         assert len({offer.label for offer in found}) == len(found)
-        shown = signature(part, document.project.contract, offset)
-        if shown is not None:
-            assert 0 <= shown.active < max(len(shown.parameters), 1)
-            signature_help(shown)
         hover(document, offset)
         definition(document, offset)
         name = name_at(document, offset)

@@ -6,8 +6,7 @@ import pytest
 
 pytest.importorskip("pygls")
 
-from avow.lsp.appearance import coloured
-from avow.lsp.completion import offers, signature
+from avow.lsp.completion import offers
 from avow.lsp.features import analyse, definition, hover, references
 from avow.lsp.plan_keys import about_key, plan_offers
 from avow.lsp.protocol import Lines, outline
@@ -35,10 +34,6 @@ def test_it_knows_them() -> None:
     far, node = outline(document, Lines(document.text))
     assert [far.name, node.name] == ["far", "n"]
     assert [(s.name, s.detail) for s in node.children or ()] == [("beyond", "definition"), ("g", "It *is* far")]
-    kinds = {TEXT[c.start : c.end]: c.kind for c in coloured(document.taken_apart, document.names)}
-    assert [kinds[word] for word in ("define", "beyond", "far", "a", "x")] == [
-        *("keyword", "function", "function", "parameter", "property")
-    ]
 
 
 def test_it_completes_them() -> None:
@@ -54,9 +49,6 @@ def test_it_completes_them() -> None:
     assert (in_body["far"], in_body["a"], in_body["in.x"]) == ("Function", "Variable", "Field")
     assert "far" not in offered("topics()\n  ")
     assert "define" in offered("topics()\n  ")
-    told = signature(document.taken_apart, document.project.contract, TEXT.index("beyond(1, 2)") + len("beyond(1, "))
-    assert told is not None
-    assert (told.label, told.active) == ("beyond(a : REAL, b : REAL)", 1)
 
 
 RECORDS = """\

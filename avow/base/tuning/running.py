@@ -95,17 +95,8 @@ NODES_REMEMBERED = 400
 SANITY_LINE = 1 << 24
 """Bytes of the answers about one node."""
 
-FILES_LOOKED_THROUGH = 2_000
-"""Files of a system's folder in which a rename looks for the old name: more are data."""
-
-BYTES_LOOKED_THROUGH = 1_000_000
-"""Bytes of a file that it reads: larger ones are recordings."""
-
 FIXES_TRIED = 12
 """Ways of doing what one hint says that the language server tries: each is a check of the text."""
-
-LINES_NAMED = 5
-"""Lines of a plan that a rename names because the old name is left in them: a name may be a common word."""
 
 DRIVEN_SECONDS = 60.0
 """Seconds for one run of a callback class, whose time is virtual: thousands of messages take one."""
