@@ -11,7 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import assert_never
 
-from .sentence import Condition, Denied, Duration, Expression, Scope, Sentence, Timing
+from .sentence import Condition, Duration, Expression, Scope, Sentence, Timing, denied
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,7 +120,7 @@ def _denied(sentence: Sentence) -> Sentence:
     if sentence.timing is Timing.AFTER:
         raise Unsaid("`only` with `after` a time is not read: say what has to hold outside")
     if sentence.timing is Timing.NEVER:
-        return replace(sentence, timing=Timing.EVENTUALLY, response=Denied(sentence.response))
+        return replace(sentence, timing=Timing.EVENTUALLY, response=denied(sentence.response))
     return replace(sentence, timing=_DENIALS.get(sentence.timing, sentence.timing))
 
 

@@ -12,7 +12,6 @@ import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import assert_never
 
 from avow.base import codec
 from avow.base.diagnostics import Diagnostic, Rejected, Severity, Span
@@ -24,21 +23,13 @@ from avow.language.terms import Builtin, Past
 from .meaning import Unsaid, demands, remarks
 from .sentence import (
     FIRST,
-    Call,
-    Denied,
     Expression,
-    Minus,
-    Name,
-    Number,
     Scope,
     Sentence,
-    Sign,
-    Truth,
     Unreadable,
     is_assumption,
     parse,
     parse_expression,
-    parts,
 )
 
 
@@ -299,32 +290,22 @@ class _Node:
 
     def _truth(self, part: Expression) -> None:
         match part:
-            case Name(text=name):
+            case Expression(sign="name", text=name):
                 self.types.setdefault(name, "BOOL")
-            case Denied(body=body):
-                self._truth(body)
-            case Sign(operator="=>" | "<=>" | "|" | "&" | "xor", left=left, right=right):
-                self._truth(left)
-                self._truth(right)
-            case Sign(operator="=" | "!=", left=Name(text=left), right=Name(text=right)):
-                self.same.append((left, right))
-            case Sign(left=left, right=right) | Call(name="preInt" | "preReal", arguments=(left, right)):
-                self._number(left)
-                self._number(right)
-            case Call(name="preBool", arguments=(left, right)):
-                self._truth(left)
-                self._truth(right)
-            case Call(arguments=(_, *rest)):  # persisted(n, p), occurred(n, p)
-                for each in rest:
+            case Expression(sign="=" | "!=", parts=(Expression(sign="name") as left, Expression(sign="name") as right)):
+                self.same.append((left.text, right.text))
+            case (
+                Expression(sign="!" | "=>" | "<=>" | "|" | "&" | "xor", parts=parts)
+                | Expression(sign="call", text="preBool", parts=parts)
+            ):
+                for each in parts:
                     self._truth(each)
-            case Number() | Truth() | Minus() | Call():
-                pass
-            case _:
-                assert_never(part)
-
-    def _number(self, part: Expression) -> None:
-        for name in _names(part):
-            self.types.setdefault(name, "REAL")
+            case Expression(sign="call", text=text, parts=parts) if text not in ("preInt", "preReal"):
+                for each in parts[1:]:  # persisted(n, p), occurred(n, p)
+                    self._truth(each)
+            case _:  # of numbers
+                for name in _names(part):
+                    self.types.setdefault(name, "REAL")
 
     def _spread(self) -> None:
         """Names that are compared have one type."""
@@ -340,26 +321,20 @@ class _Node:
 
     def _say(self, part: Expression) -> str:
         match part:
-            case Name(text=name):
+            case Expression(sign="name", text=name):
                 return self._named(name)
-            case Number(text=text):
+            case Expression(sign="number" | "truth", text=text):
                 return text
-            case Truth(value=value):
-                return "TRUE" if value else "FALSE"
-            case Denied(body=body):
-                return f"(not {self._say(body)})"
-            case Minus(body=body):
-                return f"(-{self._say(body)})"
-            case Sign(operator="mod" | "xor" as function, left=left, right=right):
-                return f"{function}({self._say(left)}, {self._say(right)})"
-            case Sign(operator="^"):
-                raise Unsaid("`^` has no counterpart: write the product")
-            case Sign(operator=operator, left=left, right=right):
-                return f"({self._say(left)} {_SIGNS.get(operator, operator)} {self._say(right)})"
-            case Call(name=name, arguments=arguments):
+            case Expression(sign="call", text=name, parts=arguments):
                 return self._called(name, [self._say(a) for a in arguments])
-            case _:
-                assert_never(part)
+            case Expression(sign="^"):
+                raise Unsaid("`^` has no counterpart: write the product")
+            case Expression(sign="mod" | "xor" as function, parts=parts):
+                return f"{function}({', '.join(map(self._say, parts))})"
+            case Expression(sign=sign, parts=(body,)):
+                return f"({_SIGNS.get(sign, sign)}{self._say(body)})"
+            case Expression(sign=sign, parts=parts):
+                return f"({f' {_SIGNS.get(sign, sign)} '.join(map(self._say, parts))})"
 
     def _called(self, name: str, arguments: list[str]) -> str:
         match name, arguments:
@@ -423,20 +398,20 @@ def _context(constants: Mapping[str, str]) -> str:
 _DEEPEST = 20
 """The depth of nested definitions that are followed."""
 
-_SIGNS = {"=>": "->", "&": "and", "|": "or", "=": "=="}
+_SIGNS = {"=>": "->", "&": "and", "|": "or", "=": "==", "!": "not "}
 
 
 def _answered(response: Expression) -> Expression:
     """The demand of a response, without its own condition."""
-    while isinstance(response, Sign) and response.operator == "=>":
-        response = response.right
+    while response.sign == "=>":
+        response = response.parts[-1]
     return response
 
 
 def _names(part: Expression) -> Iterable[str]:
-    if isinstance(part, Name):
+    if part.sign == "name":
         yield part.text
-    for each in parts(part):
+    for each in part.parts:
         yield from _names(each)
 
 

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
-from typing import Any, TypeVar, assert_never
+from typing import Any, TypeVar
 
 from lark import Lark, Token, Tree
 from lark.exceptions import UnexpectedInput
@@ -16,61 +16,13 @@ from avow.base.grammars import lark_of, misfit
 
 
 @dataclass(frozen=True, slots=True)
-class Name:
-    text: str
+class Expression:
+    """A ``name``, ``number`` or ``truth`` value with its `text`; a ``call`` of the function that `text` names; or a
+    `sign` (``!``, ``-``, ``=>``, ``|``, ``xor``, ``&``, a relation, an operation on numbers) applied to `parts`."""
 
-
-@dataclass(frozen=True, slots=True)
-class Number:
-    text: str
-
-
-@dataclass(frozen=True, slots=True)
-class Truth:
-    value: bool
-
-
-@dataclass(frozen=True, slots=True)
-class Denied:
-    body: Expression
-
-
-@dataclass(frozen=True, slots=True)
-class Minus:
-    body: Expression
-
-
-@dataclass(frozen=True, slots=True)
-class Sign:
-    """``=>``, ``<=>``, ``|``, ``xor``, ``&``, a relation, or an operation on numbers."""
-
-    operator: str
-    left: Expression
-    right: Expression
-
-
-@dataclass(frozen=True, slots=True)
-class Call:
-    name: str
-    arguments: tuple[Expression, ...]
-
-
-Expression = Name | Number | Truth | Denied | Minus | Sign | Call
-
-
-def parts(expression: Expression) -> tuple[Expression, ...]:
-    """The direct parts of an expression."""
-    match expression:
-        case Denied(body=body) | Minus(body=body):
-            return (body,)
-        case Sign(left=left, right=right):
-            return (left, right)
-        case Call(arguments=arguments):
-            return arguments
-        case Name() | Number() | Truth():
-            return ()
-        case _:
-            assert_never(expression)
+    sign: str
+    parts: tuple[Expression, ...] = ()
+    text: str = ""
 
 
 class Scope(StrEnum):
@@ -227,10 +179,10 @@ def _conditions(parts: list[Any]) -> dict[str, Any]:
         (word, expression, *truth) = [c for c in part.children if isinstance(c, Tree)]
         kind = str(word.children[0]).lower() if word.children else "when"
         said = _expression(expression)
-        denied = (kind == "unless") != bool(truth and str(truth[0].children[-1]).lower() == "false")
-        said = Denied(said) if denied else said
+        negative = (kind == "unless") != bool(truth and str(truth[0].children[-1]).lower() == "false")
+        said = denied(said) if negative else said
         either = any(str(token).lower() == "or" for token in words)
-        trigger = said if trigger is None else Sign("|" if either else "&", trigger, said)
+        trigger = said if trigger is None else Expression("|" if either else "&", (trigger, said))
         holding = holding or kind == "whenever"
     return {"trigger": trigger, "condition": Condition.HOLDING if holding else Condition.REGULAR}
 
@@ -252,26 +204,35 @@ def _unit(word: str) -> str:
 
 def _expression(tree: Any) -> Expression:
     parts = tree.children
-    make: dict[str, Callable[[], Expression]] = {
-        "name": lambda: Name(str(parts[0])),
-        "number": lambda: Number(str(parts[0])),
-        "true": lambda: Truth(True),
-        "false": lambda: Truth(False),
-        "group": lambda: _expression(parts[0]),
-        "denied": lambda: Denied(_expression(parts[0])),
-        "minus": lambda: Minus(_expression(parts[-1])),
-        "implies": lambda: Sign("=>", _expression(parts[0]), _expression(parts[1])),
-        "call": lambda: Call(str(parts[0]), tuple(map(_expression, parts[1:]))),
-    }
-    if tree.data == "sign_implies":
-        left, arrow, *inner = parts
-        _alone(arrow, left)
-        return Sign("=>", _expression(left), Sign("=>", *map(_expression, inner)))
-    if tree.data == "sign":
-        left, operator, right = parts
-        _alone(operator, left)
-        return Sign(_SIGNS.get(str(operator).lower(), str(operator)), _expression(left), _expression(right))
-    return make[tree.data]()
+    match tree.data:
+        case "name" | "number":
+            return Expression(tree.data, text=str(parts[0]))
+        case "true" | "false":
+            return Expression("truth", text=tree.data.upper())
+        case "group":
+            return _expression(parts[0])
+        case "denied":
+            return denied(_expression(parts[0]))
+        case "minus":
+            return Expression("-", (_expression(parts[-1]),))
+        case "implies":
+            return Expression("=>", tuple(map(_expression, parts)))
+        case "call":
+            return Expression("call", tuple(map(_expression, parts[1:])), str(parts[0]))
+        case "sign_implies":
+            left, arrow, *inner = parts
+            _alone(arrow, left)
+            return Expression("=>", (_expression(left), Expression("=>", tuple(map(_expression, inner)))))
+        case _:  # a sign between two parts
+            left, operator, right = parts
+            _alone(operator, left)
+            sign = str(operator).lower()
+            return Expression(_SIGNS.get(sign, sign), (_expression(left), _expression(right)))
+
+
+def denied(body: Expression) -> Expression:
+    """The negation."""
+    return Expression("!", (body,))
 
 
 def _alone(arrow: Token, left: Any) -> None:
@@ -288,4 +249,4 @@ FIRST = "FTP"
 """FRET's name for the predicate: this is the first step of the run."""
 
 
-_SIGNS = {"->": "=>", "<->": "<=>", "xor": "xor", "mod": "mod"}
+_SIGNS = {"->": "=>", "<->": "<=>"}

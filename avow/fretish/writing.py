@@ -95,7 +95,7 @@ def _duration(limit: t.Limit | None) -> str:
     raise _Beyond("a limit shorter than a microsecond")
 
 
-_SIGNS = {"==": "="}
+_CONNECTIVES = {t.And: "&", t.Or: "|", t.Implies: "=>", t.Iff: "<=>"}
 
 
 def _say(term: t.Term) -> str:
@@ -107,40 +107,26 @@ def _say(term: t.Term) -> str:
             raise _Beyond("a text")
         case t.Literal(value=value):
             return _number(Fraction(value))
-        case t.Variable(role=t.Role.INPUT | t.Role.OUTPUT, name=name):
-            return _name(name)
-        case t.EnumValue(name=name):
+        case t.Variable(role=t.Role.INPUT | t.Role.OUTPUT, name=name) | t.EnumValue(name=name):
             return _name(name)
         case t.Widen(term=inner):
             return _say(inner)
         case t.Not(body=body):
             return f"!{_say(body)}"
-        case t.And(items=items):
-            return f"({' & '.join(map(_say, items))})"
-        case t.Or(items=items):
-            return f"({' | '.join(map(_say, items))})"
-        case t.Implies(left=left, right=right):
-            return f"({_say(left)} => {_say(right)})"
-        case t.Iff(left=left, right=right):
-            return f"({_say(left)} <=> {_say(right)})"
-        case t.Compare(operator=sign, left=left, right=right) if isinstance(left.sort, BoolSort):
-            return f"({_say(left)} <=> {_say(right)})" if sign == "==" else f"({_say(left)} xor {_say(right)})"
-        case t.Compare(operator=sign, left=left, right=right):
-            return f"({_say(left)} {_SIGNS.get(sign, sign)} {_say(right)})"
-        case t.Arithmetic(operator="+" | "-" | "*" | "/" as sign, left=left, right=right):
-            return f"({_say(left)} {sign} {_say(right)})"
         case t.Negative(term=inner):
             return f"(-{_say(inner)})"
-        case t.Operation(operator=t.Builtin.XOR, arguments=(left, right)):
-            return f"({_say(left)} xor {_say(right)})"
-        case t.Operation(operator=t.Builtin.MOD, arguments=(left, right)):
-            return f"({_say(left)} mod {_say(right)})"
-        case t.Operation(
-            operator=t.Builtin.ABS | t.Builtin.MIN | t.Builtin.MAX | t.Builtin.DIV as operator, arguments=arguments
-        ):
+        case t.And() | t.Or() | t.Implies() | t.Iff():
+            return _infix(_CONNECTIVES[type(term)], term)
+        case t.Compare(operator=sign, left=left) if isinstance(left.sort, BoolSort):
+            return _infix("<=>" if sign == "==" else "xor", term)
+        case t.Compare(operator=sign):
+            return _infix("=" if sign == "==" else sign, term)
+        case t.Arithmetic(operator=sign):
+            return _infix(sign, term)
+        case t.Operation(operator=t.Builtin.XOR | t.Builtin.MOD as operator):
+            return _infix(operator, term)
+        case t.Operation(operator=operator, arguments=arguments):
             return f"{operator}({', '.join(map(_say, arguments))})"
-        case t.Operation(operator=operator):
-            raise _Beyond(f"`{operator}`")
         case t.History(operator=t.Past.PREVIOUS, arguments=(value, first)):
             return f"{_previous(term)}({_say(first)}, {_say(value)})"
         case t.History(operator=t.Past.ROSE, arguments=(inner,)) if inner == t.TRUE:
@@ -154,6 +140,10 @@ def _say(term: t.Term) -> str:
             raise _Beyond(f"`{operator}`")
         case _:
             raise _Beyond(f"a {type(term).__name__.lower()} ({term.sort})" if term.children else "this term")
+
+
+def _infix(sign: str, term: t.Term) -> str:
+    return f"({f' {sign} '.join(map(_say, term.children))})"
 
 
 def _previous(term: t.History) -> str:

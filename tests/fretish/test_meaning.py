@@ -12,7 +12,7 @@ import pytest
 from reference.meaning import breaks
 
 from avow.fretish.meaning import Unsaid, demands, remarks
-from avow.fretish.sentence import Condition, Denied, Duration, Expression, Name, Scope, Sentence, Timing, parse
+from avow.fretish.sentence import Condition, Duration, Expression, Scope, Sentence, Timing, parse
 from avow.language.load import check_text
 from avow.language.terms import Term
 
@@ -122,10 +122,11 @@ def required(sentence: Sentence, run: Run) -> bool:
 
 
 def say(part: Expression) -> str:
-    if isinstance(part, Denied):
-        return f"(not {say(part.body)})"
-    assert isinstance(part, Name)
-    return f"in.{part.text}"
+    return f"in.{part.text}" if part.sign == "name" else f"(not {say(*part.parts)})"
+
+
+def name(text: str) -> Expression:
+    return Expression("name", text=text)
 
 
 def clauses(sentence: Sentence) -> list[Term]:
@@ -137,7 +138,7 @@ def clauses(sentence: Sentence) -> list[Term]:
 
 
 TEMPLATES = [
-    Sentence("n", Name("r"), timing, scope, Name("m"), condition, Name("c"), Name("s"), Duration(str(N), "steps"))
+    Sentence("n", name("r"), timing, scope, name("m"), condition, name("c"), name("s"), Duration(str(N), "steps"))
     for scope, condition, timing in product(Scope, Condition, Timing)
 ]
 
