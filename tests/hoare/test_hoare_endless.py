@@ -1,4 +1,4 @@
-"""Loops: partial correctness is no proof, a run that comes back to a state is found, random programs are held against runs."""
+"""Loops: partial correctness is no proof, a repeated state is found, random programs are held against runs."""
 
 from __future__ import annotations
 
