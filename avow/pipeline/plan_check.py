@@ -160,6 +160,7 @@ def _method(
         wrong = tuple(misshapen(tool.options_schema, method.options, whole, shelf))
     yield from wrong
     without: tuple[Span, ...] = ()
+    dropped: tuple[str, ...] = ()
     if any(d.is_error for d in wrong):
         options, without = _right(tool.options_schema, method.options)
         if (
@@ -167,12 +168,15 @@ def _method(
             or tool.campaigns in method.options.data.keys() - options.data
         ):
             return  # without the faulty options the others mean nothing
+        dropped = tuple(f"`{key}`" for key in method.options.data if key not in options.data)
         method = replace(method, options=options)
     for known in (n for n in system.contract.nodes if n.name == node):
         named = {clause.name for clause in known.guarantees}  # others are reported where the plan names them
         method = replace(method, guarantees=tuple(name for name in method.guarantees if name in named))
         job = method_job(system, known, method)
-        yield from (d for d in one_step.check(tool, job) if not (follows(d) or d.span in without))
+        for d in one_step.check(tool, job):
+            if not (follows(d) or d.span in without or any(key in d.message for key in dropped)):
+                yield d
 
 
 def _right(schema: Mapping[str, Any], options: Located) -> tuple[Located, tuple[Span, ...]]:

@@ -112,7 +112,8 @@ def in_order(found: Iterable[Diagnostic]) -> tuple[Diagnostic, ...]:
 
 def without_followers(found: Iterable[Diagnostic]) -> tuple[Diagnostic, ...]:
     """Leaves out each finding about an undefined type of messages if another finding says why: a faulty definition, two
-    names for the type of one topic, or a package that is not there. A warning that explains an error becomes one."""
+    names for the type of one topic, or a package that is not there; and what would follow for a port that does not
+    exist. A warning that explains an error becomes one."""
     told = list(found)
     causes: dict[str, Diagnostic] = {}
     for code in _CAUSES:
@@ -120,6 +121,7 @@ def without_followers(found: Iterable[Diagnostic]) -> tuple[Diagnostic, ...]:
             if d.code == code and (code != "PLAN105" or d.message.startswith("ros.distro")):
                 names = [""] if code == "PLAN105" else _types(d.message)
                 causes |= {name: d for name in names if not _explained(name, causes)}
+    unknown = {name: d for d in told if d.code == "PLAN106" for name in _QUOTED.findall(d.message)}
     kept: list[Diagnostic] = []
     blamed: set[Diagnostic] = set()
     for d in told:
@@ -128,6 +130,8 @@ def without_followers(found: Iterable[Diagnostic]) -> tuple[Diagnostic, ...]:
             why = next((it for name in _types(d.message) if (it := _explained(name, causes)) is not None), None)
         elif d.code == "ROS133":  # what the code does with the topic cannot be compared
             why = next((it for it in causes.values() if it.code == "ROS104" and it.span == d.span), None)
+        elif d.code in ("ROS112", "PLAN113"):
+            why = next((it for name, it in unknown.items() if f" {name} " in f" {d.message} "), None)
         if why is None or why.code == d.code:
             kept.append(d)
         elif d.is_error:
