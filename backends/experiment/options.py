@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import field
 from fractions import Fraction
+from pathlib import Path
 
-from avow.backend_kit.given import REASON, existing_file, file, schema, text
+from avow.backend_kit.given import existing_file, schema
 from avow.backend_kit.protocol import Job
 from avow.base.diagnostics import Diagnostic, Rejected, Span
+from avow.base.files import read_text
 from avow.base.plain import alike, exact
 from avow.base.records import dataclass
 from avow.base.suggestions import nearest, suggest
@@ -18,68 +21,9 @@ from avow.language.sorts import BOOL, REAL, Sort
 
 from .binding import WORDS, Binding, Interpretation, Unfit, bound, interpretation
 from .judging import Claim, Judged, Step, claim
-from .profile import CAMPAIGN
 from .table import Row, Table, read_table
 
-_COLUMN = text("a column")
-_COLUMNS = {"type": "array", "items": _COLUMN, "minItems": 1, "description": "columns, in order"}
-
-SCHEMA = schema(
-    {
-        "data": file("CSV file, one row a run"),
-        "mapping": {
-            "type": "object",
-            "description": "the columns of a port (in.speed, out.distance); a column of the port's name needs no entry",
-            "additionalProperties": {
-                "oneOf": [
-                    _COLUMN,
-                    _COLUMNS,
-                    {
-                        "type": "object",
-                        "properties": {
-                            "field": _COLUMN,
-                            "values": {
-                                "type": "object",
-                                "additionalProperties": {"type": "string"},
-                                "description": "a cell's word: the contract's name",
-                            },
-                            "constructor": text("the column that names the constructor; a constructor: its columns"),
-                        },
-                        "additionalProperties": _COLUMNS,
-                    },
-                ]
-            },
-        },
-        "interpret": {
-            "type": "object",
-            "additionalProperties": {"type": "string"},
-            "description": "what a predicate, such as out.at(x, y), or a part of a guarantee means, as a formula over "
-            "columns; an assumption",
-        },
-        "run_column": text("the column that identifies a run (default: run, trial or id)"),
-        "steps": {"type": "boolean", "description": "the rows of a run are its steps; without it, each row is a run"},
-        "campaign": CAMPAIGN,
-        "strata": text("the column of the condition under which a run was made: each condition has a bound"),
-        "confidence": {"type": ["number", "string"], "description": "of the bound: 0.9 or more, default 0.95"},
-        "at_least": {
-            "type": ["number", "string"],
-            "description": "the claimed probability of success, no less than the criticality asks for; without it no "
-            "run at all may fail",
-        },
-        "protocol": text("how the runs were made, for the report"),
-        "left_out": {
-            "type": "object",
-            "properties": {
-                "runs": {"type": "array", "items": {"type": ["string", "integer"]}, "minItems": 1},
-                "because": REASON,
-            },
-            "required": ["runs", "because"],
-            "additionalProperties": False,
-            "description": "runs that failed before and are no longer among the data, and why they do not count",
-        },
-    },
-    "data",
-)
+SCHEMA = schema(json.loads(read_text(Path(__file__).with_name("options.json"), "utf-8")), "data")
 
 RUN_COLUMNS = ("run", "trial", "id")
 """The columns that may contain the names of runs, unless the plan names one."""

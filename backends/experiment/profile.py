@@ -13,7 +13,6 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
-from avow.backend_kit.given import file, text
 from avow.backend_kit.protocol import Job
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.files import digest_or_missing, inside, sha256
@@ -22,44 +21,6 @@ from avow.base.records import dataclass
 from avow.base.suggestions import suggest
 
 from .tuning import DRAWN_STEPS
-
-_VALUE = {"type": ["string", "number", "boolean"]}
-
-CAMPAIGN: Mapping[str, Any] = {
-    "type": "object",
-    "description": "`avow campaign` makes the runs with a simulator, and writes them to `data`",
-    "properties": {
-        "command": {
-            "type": "array",
-            "items": {"type": ["string", "number"]},
-            "minItems": 1,
-            "description": "the program and its arguments; {seed}, {trace} and {a parameter} are replaced",
-        },
-        "scenario": {
-            "type": "object",
-            "minProperties": 1,
-            "propertyNames": {"pattern": "^[a-z][a-z0-9_]*$"},
-            "description": "the profile of use: each parameter with its distribution",
-            "additionalProperties": {
-                "oneOf": [
-                    {"type": "array", "items": _VALUE, "minItems": 1, "description": "equally frequent values"},
-                    {
-                        "type": "object",
-                        "properties": {"from": _VALUE, "to": _VALUE, "usual": _VALUE},
-                        "required": ["from", "to"],
-                        "additionalProperties": False,
-                        "description": "a number, uniformly distributed; `usual`: where shrinking leads (the middle)",
-                    },
-                ]
-            },
-        },
-        "trace": text("the name of the recording that the command writes: run.jsonl, run.mcap, a folder"),
-        "files": {"type": "array", "items": file("a file or folder that the command reads")},
-        "runs": {"type": "integer", "minimum": 1, "maximum": 100_000, "description": "drawn runs at most (300)"},
-    },
-    "required": ["command", "scenario", "trace"],
-    "additionalProperties": False,
-}
 
 COLUMNS = ("run", "seed", "ended", "made_by", "sha256")
 """The columns of a table of runs besides the parameters."""
