@@ -21,6 +21,7 @@ from avow.language.subterms import subterms
 from avow.language.terms import Apply, Compare, Construct, In, Not, Quantified, Quantifier, Role, Term, Variable
 from avow.sanity.realizability import realizable
 from avow.sanity.witness_search import Formulas, Given, Group, Realizability, groups
+from avow.solving.limits import effort_left, until
 from avow.solving.questions import solve
 from avow.solving.replay import replay
 
@@ -51,17 +52,22 @@ def conflicts(
     effort: int = 4_000,
     seed: int = 0,
 ) -> tuple[Conflict, ...]:
-    """A conflict for each group of guarantees that share outputs, given one in `answer`, which comes first. The effort
-    is for each group."""
+    """Conflicts among guarantees, given one in `answer`: those of its group first. Without the first clause of each
+    of them nothing more is found. The effort is for each group of guarantees that share outputs."""
     found: list[Conflict] = []
     for group in groups(guarantees, outputs):
-        at = answer.inputs
-        if tuple(group.guarantees) != answer.group:
-            other = realizable(inputs, group.outputs, assumptions, group.guarantees, effort=effort // 2, seed=seed)
-            if other.verdict is not Verdict.REFUTED:
-                continue
-            at = other.inputs
-        found.append(_explained(tuple(inputs), group, assumptions, at, seed))
+        deadline, left = until(effort), dict(group.guarantees)
+        at: Given | None = answer.inputs if tuple(left) == answer.group else None
+        while left and effort_left(deadline):
+            if at is None:
+                limit = min(effort // 2, effort_left(deadline))
+                other = realizable(inputs, group.outputs, assumptions, left, effort=limit, seed=seed)
+                if other.verdict is not Verdict.REFUTED:
+                    break
+                at = other.inputs
+            found.append(_explained(tuple(inputs), Group(left, group.outputs), assumptions, at, seed))
+            left.pop(found[-1].clauses[0])
+            at = None
     found.sort(key=lambda conflict: not set(conflict.clauses) <= set(answer.group))
     return tuple(found)
 

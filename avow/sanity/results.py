@@ -33,7 +33,7 @@ class Finding:
     """The clauses that a refutation or a proof depends on (for conflicts, of the first), without the node's name."""
     counterexample: Counterexample | None = None
     conflicts: tuple[tuple[tuple[str, ...], Counterexample], ...] = ()
-    """For each group of guarantees, a minimal set that cannot be met, with an input and what each demands there."""
+    """Minimal sets of clauses that cannot all be met at some input, each with one and what each demands there."""
     because: str | None = None
     """The name of the result of which this one is only a consequence."""
     engine: str = "z3"
