@@ -226,7 +226,6 @@ def conclude(facts: Facts) -> Case:
         hazards=hazards,
         standard=standard,
         graph_svg=facts.graph_svg,
-        maps=facts.maps,
         statements=facts.statements,
         baseline=facts.baseline,
         sources=facts.sources,

@@ -19,7 +19,6 @@ from avow.assurance.model import (
     Case,
     Derivation,
     EnvironmentView,
-    MapView,
     MethodInfo,
     NodeView,
     RunInfo,
@@ -62,7 +61,6 @@ class Facts:
     tools: tuple[ToolInfo, ...]
     discrepancies: tuple[Discrepancy, ...] | None
     graph_svg: str
-    maps: tuple[MapView, ...] = ()
     sources: tuple[SourceView, ...] = ()
     statements: tuple[Statement, ...] = ()
     baseline: Baseline | None = None
@@ -145,7 +143,6 @@ def facts_of_system(
         tools=tuple(sorted(tools, key=lambda t: (t.name, t.version or ""))),
         discrepancies=None if discrepancies is None else tuple(discrepancies),
         graph_svg=graph_svg,
-        maps=_maps(plan),
         sources=tuple(
             sorted(
                 (SourceView(path, text) for path, text in sources.items()), key=lambda s: (not s.is_contract, s.path)
@@ -162,18 +159,6 @@ def facts_of_system(
 def _feeds(system: System, node: str, port: str) -> str:
     edge = dataflow(system).by_target.get(Endpoint(node, port))
     return edge.source.node if edge else ""
-
-
-def _maps(plan: Plan) -> tuple[MapView, ...]:
-    found = []
-    if plan.scenario is None:
-        return ()
-    for picture in plan.pictures:
-        table = plan.scenario.table(picture.table)
-        labels = table.column(picture.label) if picture.label else ("",) * len(table.rows)
-        points = zip(table.column(picture.x), table.column(picture.y), labels, strict=True)
-        found.append(MapView(picture.name, tuple(points), picture.places))
-    return tuple(found)
 
 
 def facts_of_case(case: Case) -> Facts:
@@ -231,7 +216,6 @@ def facts_of_case(case: Case) -> Facts:
         tools=case.tools,
         discrepancies=case.discrepancies if case.audited else None,
         graph_svg=case.graph_svg,
-        maps=case.maps,
         sources=case.sources,
         statements=case.statements,
         baseline=case.baseline,

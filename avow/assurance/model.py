@@ -348,16 +348,6 @@ class SourceView:
 
 
 @dataclass(frozen=True, slots=True)
-class MapView:
-    """Places that counterexamples may name: (x, y, label) as exact text, from a table of the plan's scenario."""
-
-    name: str
-    points: tuple[tuple[str, str, str], ...]
-    places: tuple[str, ...] = ()
-    """Names of calls whose argument is a label."""
-
-
-@dataclass(frozen=True, slots=True)
 class OpenItem:
     """Something that a reader must know before believing the rest. `kind` is a status word, ``expired`` or the like."""
 
@@ -453,7 +443,6 @@ class Case:
     """The objectives of the standard that the policy names."""
     graph_svg: str = ""
     """The dataflow diagram; shown as an image, never as markup."""
-    maps: tuple[MapView, ...] = ()
     statements: tuple[Statement, ...] = ()
     """The plan's words for the assumptions."""
     baseline: Baseline | None = None

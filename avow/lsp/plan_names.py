@@ -190,8 +190,6 @@ class _Reader:
             for attribute, at, _ in self.keys(entry.at("source", "memory")):
                 yield from self.words(_Region(at, at + len(attribute)), name)
         yield from self.scenario(root)
-        for _, _, picture in self.keys(root.at("pictures")):
-            yield from self.scalar(picture.at("places"), self.element)
         for key in _FINDINGS:
             for finding in root.each(key):
                 for inner in ("obligation", "matched"):

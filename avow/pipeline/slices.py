@@ -81,7 +81,6 @@ def compose_slice(system: System) -> ComposeSlice:
         accepted=(),
         plugins=(),
         lints_off=(),
-        pictures=(),
         hazards=(),
         statements=(),
         launched=None,

@@ -33,7 +33,6 @@ from avow.base.tuning.shown import FINDING_CHARACTERS, GUARANTEE_ROWS, OBLIGATIO
 from avow.evidence.obligation import SYSTEM_LEVEL, Kind
 from avow.evidence.status import Status, weigh
 from avow.report import example, source, wording
-from avow.report.maps import draw_map
 from avow.report.wording import history
 
 KINDS = (Kind.GUARANTEE, Kind.SANITY, Kind.COMPOSITION, Kind.REQUIREMENT, Kind.PROGRAM, Kind.WELL_FORMED)
@@ -92,7 +91,6 @@ def environment() -> Environment:
         "bound_text": wording.bound_text,
         "gate_line": wording.gate_line,
         "derivation": _derivation,
-        "draw_map": draw_map,
         "draw_timelines": _timelines,
         "example_run": example.run,
         "example_values": example.values,

@@ -20,7 +20,6 @@ from avow.evidence.obligation import SYSTEM_LEVEL, Kind
 from avow.evidence.status import Status
 from avow.report import example
 from avow.report.answers_page import full_reason, others, worded
-from avow.report.maps import map_picture
 from avow.report.modules import RequirementModule, requirement_modules
 from avow.report.page import by_node
 from avow.report.source import plain_lines
@@ -254,7 +253,7 @@ def _obligation(case: Case, view: ObligationView) -> dict[str, Any]:
                 "tool": e.tool_told,
                 "summary": f"{e.summary}. How it was measured: {protocol(e)}" if protocol(e) else e.summary,
                 "bound": bound_text(e.bound),
-                "counter": _counter(case, e.counterexample) if e.counterexample else None,
+                "counter": _counter(e.counterexample) if e.counterexample else None,
                 "lanes": [{"svg": str(picture(t, alone=True)), "told": in_words(t)} for t in timelines(e.details)],
             }
             for e in view.records
@@ -262,14 +261,13 @@ def _obligation(case: Case, view: ObligationView) -> dict[str, Any]:
     }
 
 
-def _counter(case: Case, shown: Counterexample) -> dict[str, Any]:
+def _counter(shown: Counterexample) -> dict[str, Any]:
     """The contract's values and the run as on the page, without the tool's own names and the middle of long runs."""
     told, found = example.values(shown), example.run(shown)
     rows = [row for row in found.rows if not row.middle]
     notes = [f"{found.left_out + found.beyond} rows in the middle are left out"] if found.left_out else []
     if shown.loop is not None:
         notes.append(f"after the last step the run returns to step {shown.loop}, and goes on like this for ever")
-    pictures = [map_picture(view, shown, alone=True) for view in case.maps]
     return {
         "why": shown.explanation or "what the contract leaves open",
         "values": [[v.name, v.value, v.other] for v in told],
@@ -277,7 +275,6 @@ def _counter(case: Case, shown: Counterexample) -> dict[str, Any]:
         "columns": list(found.columns) if found.columns and len(found.columns) <= PDF_COLUMNS else [],
         "rows": [[row.label + (" ↺" if row.returns else ""), *([c.text, c.new] for c in row.cells)] for row in rows],
         "note": "; ".join(notes),
-        "maps": [{"svg": svg, "told": words} for svg, words in pictures if svg],
     }
 
 

@@ -384,21 +384,6 @@ def is_wild(pattern: str) -> bool:
 
 
 @dataclass(frozen=True, slots=True)
-class Picture:
-    """How the report draws a counterexample's places: the scenario's table that holds them, and its columns.
-
-    `places` are words of calls whose only argument is a label: with ``inspect`` among them, ``inspect(3)`` is place 3.
-    """
-
-    name: str
-    table: str
-    x: str
-    y: str
-    label: str | None = None
-    places: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True, slots=True)
 class Ros:
     """The plan's entry for ROS: the distribution whose message types apply, and the names of nodes and topics."""
 
@@ -442,7 +427,6 @@ class Plan:
     plugins: tuple[str, ...] = ()
     """Modules with further backends."""
     lints_off: tuple[str, ...] = ()
-    pictures: tuple[Picture, ...] = ()
     subsystems: tuple[Subsystem, ...] = ()
     statements: tuple[Statement, ...] = ()
     ros: Ros = Ros()

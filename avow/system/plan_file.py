@@ -30,7 +30,6 @@ from avow.system.plan import (
     Located,
     NodeEnds,
     NodePlan,
-    Picture,
     Plan,
     Requirement,
     Ros,
@@ -149,7 +148,6 @@ class _PlanReader:
             accepted=tuple(self.findings("accepted")),
             plugins=self.root.texts("plugins"),
             lints_off=self.root.texts("lints_off"),
-            pictures=tuple(self.pictures(scenario)),
             subsystems=tuple(self.subsystems()),
             statements=self.noted(read_statements(self.root)),
             ros=_ros(self.root),
@@ -179,23 +177,6 @@ class _PlanReader:
         found, faults = read
         self.faults += faults
         return found
-
-    def pictures(self, scenario: Scenario | None) -> Iterator[Picture]:
-        tables = {table.name: table for table in scenario.tables} if scenario else {}
-        for name, _, piece in self.root.keyed("pictures"):
-            source = piece.at("table") or piece
-            table = tables.get(source.text)
-            if table is None:
-                self.fault("PLAN109", f"pictures.{name}: the scenario has no table {source.text!r}", source.span)
-                continue
-            columns = {key: found for key in ("x", "y", "label") if (found := piece.at(key)) is not None}
-            missing = [c for c in columns.values() if c.text not in table.columns]
-            for column in missing:
-                message = f"pictures.{name}: table {table.name!r} has no column {column.text!r}"
-                self.fault("PLAN109", message, column.span)
-            if not missing:
-                texts = {key: column.text for key, column in columns.items()}
-                yield Picture(name, table.name, texts["x"], texts["y"], texts.get("label"), piece.texts("places"))
 
     def resolve(self, piece: Piece) -> Path | None:
         path = inside(self.path.parent, piece.text)

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import random
-from dataclasses import replace
 
 from assurance.sample import case, evidence, guarantee, system
 
-from avow.assurance.model import MapView
 from avow.base.verdict import Counterexample, Verdict
 from avow.report import example
-from avow.report.maps import map_picture
 from avow.report.pdf import _counter
 from report.pages import claim_pages
 from report.test_page import Page
@@ -92,21 +89,9 @@ def test_the_page_shows_values_run_and_what_paper_leaves_out() -> None:
     assert "What the contract leaves open" in one(Counterexample((("out.s", "1"), ("out.s (another)", "2"))))
 
 
-def test_the_pdf_has_the_same_tables_and_the_map() -> None:
-    target = guarantee("n", "g")
+def test_the_pdf_has_the_same_tables() -> None:
     shown = Counterexample((("in.at", "{(2, 3)}"),), "why", steps(*map(str, range(60))), 7)
-    found = case(system({"n": ["g"]}), [target], [evidence(target, Verdict.REFUTED, counterexample=shown)])
-    found = replace(found, maps=(MapView("place", (("0", "0", "a"), ("2", "3", "b"))),))
-    told = _counter(found, shown)
+    told = _counter(shown)
     assert told["values"] == [["in.at", "{(2, 3)}", ""]]
     assert len(told["rows"]) == 20
     assert "40 rows in the middle are left out" in told["note"]
-    assert "in.at: place b" in told["maps"][0]["told"]
-    svg, _ = map_picture(found.maps[0], shown, alone=True)
-    assert "<style>" in svg
-    assert "var(" not in svg
-
-
-def test_the_tools_own_words_mark_no_place_outside_a_run() -> None:
-    view = MapView("place", (("0", "0", "a"), ("2", "3", "b")), ("going",))
-    assert map_picture(view, Counterexample((("(property)", "B(r, going(a))"),))) == ("", "")

@@ -14,7 +14,6 @@ FINDING = "{{obligation: {}, verdict: refuted, reason: r, who: A. Person, date: 
 CONFIRMED = "requirements: {{R: {{text: t, validation: {{who: A. Person, date: {}, sentence: x}}}}}}"
 REQUIREMENT = "requirements: {{R: {{text: t, {}}}}}"
 BOTH = REQUIREMENT.format("formula: a, temporal: b")
-PICTURE = "scenario: {{t: [{{x: 1, y: 2}}]}}\npictures: {{p: {{table: {}, x: x, y: {}}}}}"
 
 
 def findings(obligation: str, more: str = "") -> str:
@@ -46,8 +45,6 @@ def findings(obligation: str, more: str = "") -> str:
         ),
         ("subsystems: {s: {system: ../b}}", "subsystems: {s: {system: ../c}}", "PLAN107", "there is no folder '../c'"),
         ("subsystems: {s: {system: ../b}}", "subsystems: {s: {system: ../../b}}", "PLAN108", "holds the system's"),
-        (PICTURE.format("t", "y"), PICTURE.format("u", "y"), "PLAN109", "pictures.p: the scenario has no table 'u'"),
-        (PICTURE.format("t", "y"), PICTURE.format("t", "z"), "PLAN109", "pictures.p: table 't' has no column 'z'"),
         ("contract: a.rcl", "contract: b.rcl", "PLAN107", "there is no file 'b.rcl'"),
         ("contract: a.rcl", "contract: ../a/b/a.rcl", "PLAN107", "there is no file '../a/b/a.rcl'"),
         ("messages: [a.rcl]", "messages: [../b]", "PLAN108", "'../b' leads out of the system's folder"),
@@ -95,7 +92,6 @@ def test_what_stands_in_a_plan_is_what_is_read(tmp_path: Path) -> None:
         "subsystems: {s: {nodes: [a], rule: R2}}\n"
         "connections: [{from: a.x, to: [a.y, a.z], delayed: true, initial: true}]\n"
         "scenario: {t: [{p: 1, q: 2, r: 3}], steps: 7}\n"
-        "pictures: {map: {table: t, x: p, y: q, label: r, places: [inspect]}}\n"
     )
     plan, _, wrong = read_plan(tmp_path / "plan.yaml")
     assert wrong == ()
@@ -107,5 +103,3 @@ def test_what_stands_in_a_plan_is_what_is_read(tmp_path: Path) -> None:
     ]
     assert plan.scenario is not None
     assert plan.scenario.steps == 7
-    (picture,) = plan.pictures
-    assert (picture.x, picture.y, picture.label, picture.places) == ("p", "q", "r", ("inspect",))

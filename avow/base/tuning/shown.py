@@ -62,9 +62,6 @@ ROWS_LEFT_OUT = 3
 CONTRACT_LINES = 1200
 """Lines of a contract in the PDF or the appendix, which then says so: some twenty pages."""
 
-MAP_STEPS = 200
-"""Steps of a run on a map: more cover each other."""
-
 SUMMARY_ROWS = 200
 """Rows of a table in the summary; all of them are in report.json."""
 
