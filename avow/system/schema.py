@@ -160,7 +160,9 @@ def _explain(error: Any, root: Piece, whole: str, also: Iterable[Any] = ()) -> I
         case "additionalProperties":
             known = list(error.schema.get("properties", {}))
             for key in (key for key in piece.entries or {} if key not in known):
-                yield fault(f"unknown key {key!r}", "PLAN103", piece.key_span(key), suggest(key, known))
+                empty = (piece.entries or {})[key].data is None and not did_you_mean(key, known)
+                hint = f"a text with a comma needs quotes: “…, {key}”" if empty else suggest(key, known)
+                yield fault(f"unknown key {key!r}", "PLAN103", piece.key_span(key), hint)
         case "required" | "dependentRequired":
             named = str(error.message).split("'")[1]
             yield fault(f"the key {named!r} is missing", "PLAN104")

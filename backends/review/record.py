@@ -6,29 +6,25 @@ meaning, and becomes stale like a proof. `avow review stamp` fills in the digest
 
 from __future__ import annotations
 
-import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
-from avow.backend_kit.given import file_bytes
+from avow.backend_kit.given import file_bytes, schema
 from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.base.files import digest_file, inside
 from avow.base.persons import unreadable, wrong_day
 from avow.base.records import dataclass
-from avow.base.suggestions import suggest
 from avow.formulas.formula import node_digest
 from avow.language.contract import Node
+from avow.system.schema import violations
 from avow.system.strict_yaml import Piece, read_yaml
 
 FORMAT = 1
 """The version of the record. A later one is rejected, not guessed."""
 CONCLUSIONS = ("accepted", "conditional", "rejected")
 """From best to worst."""
-ANSWERS = ("yes", "no", "n/a")
-
-_SHA256 = re.compile(r"[0-9a-f]{64}")
-_KEYS = ("format", "system", "node", "reviewer", "role", "date", "valid_until", "read", "clauses", "checklist",
-         "conclusion", "conditions", "remarks")  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,14 +79,55 @@ class Record:
     span: Span
 
 
+_TEXT = {"type": "string", "pattern": r"\S", "description": "text"}
+_REMARK = {"type": ["string", "null"]}
+_DIGEST = {
+    "type": ["string", "null"],
+    "pattern": "^([0-9a-f]{64}|[?~]?)$",
+    "description": "a SHA-256 in 64 small hexadecimal digits, which `avow review stamp` fills in",
+}
+_CONCLUSION = {"enum": CONCLUSIONS}
+_YES_NO = ("yes", "no", True, False)  # some editors write YAML's yes and no as true and false
+_QUESTION = {
+    "question": _TEXT,
+    "answer": {"enum": (*_YES_NO, "n/a")},
+    "wanted": {"enum": _YES_NO},
+    "note": _REMARK,
+}
+_JUDGED = schema({"meaning": _DIGEST, "conclusion": _CONCLUSION, "remark": _REMARK})
+_READ = (
+    _TEXT,
+    schema({"file": _TEXT, "sha256": _DIGEST}, "file"),
+    schema({"material": _TEXT}, "material"),
+)
+SCHEMA = schema(
+    {
+        "format": {"const": FORMAT},
+        "system": _REMARK,
+        "node": _REMARK,
+        "reviewer": _TEXT,
+        "role": _TEXT,
+        "date": _TEXT,
+        "valid_until": _TEXT,
+        "read": {"type": "array", "minItems": 1, "items": {"oneOf": _READ}, "description": "what was read"},
+        "clauses": {"type": ["object", "null"], "additionalProperties": {"anyOf": (_DIGEST, _JUDGED)}},
+        "checklist": {
+            "type": "array",
+            "minItems": 1,
+            "items": schema(_QUESTION, "question", "answer"),
+            "description": "what was asked",
+        },
+        "conclusion": _CONCLUSION,
+        "conditions": {"type": "array", "items": _TEXT},
+        "remarks": _REMARK,
+    },
+    *("reviewer", "role", "date", "read", "checklist", "conclusion"),
+)
+
+
 def read_record(path: Path) -> Record:
     """Raises Rejected, with every problem and its place."""
     return record_in(*load(path))
-
-
-def record_in(piece: Piece, problems: Sequence[Diagnostic]) -> Record:
-    """The record in a YAML text. Raises Rejected, with every problem and its place."""
-    return _RecordReader(piece, list(problems)).read()
 
 
 def load(path: Path) -> tuple[Piece, tuple[Diagnostic, ...]]:
@@ -98,173 +135,90 @@ def load(path: Path) -> tuple[Piece, tuple[Diagnostic, ...]]:
     return read_yaml(file_bytes(path, "REV102"), str(path))
 
 
-class _RecordReader:
-    def __init__(self, piece: Piece, problems: list[Diagnostic]) -> None:
-        self.piece = piece
-        self.problems = problems
+def record_in(piece: Piece, problems: Sequence[Diagnostic]) -> Record:
+    """The record in a YAML text. Raises Rejected: with every problem of its form, else with every contradiction."""
+    wrong = violations(piece.located(), SCHEMA, "the record")
+    if problems or wrong:
+        raise Rejected(*problems, *(replace(d, code="REV111") for d in wrong))
+    data = piece.data
+    record = Record(
+        _text(data.get("system")),
+        _text(data.get("node")),
+        _text(data["reviewer"]),
+        _text(data["role"]),
+        _text(data["date"]),
+        _text(data.get("valid_until")) or None,
+        tuple(map(_reading, piece.each("read"))),
+        tuple(_judged(name, entry.data, at) for name, at, entry in piece.keyed("clauses")),
+        tuple(map(_question, data["checklist"])),
+        data["conclusion"],
+        tuple(map(_text, data.get("conditions", ()))),
+        _text(data.get("remarks")),
+        piece.span,
+    )
+    if found := tuple(_contradictions(record, piece)):
+        raise Rejected(*found)
+    return record
 
-    def read(self) -> Record:
-        top = self.mapping(self.piece, _KEYS)
-        form = top.get("format")
-        if form is not None and form.value != FORMAT:
-            raise Rejected(Diagnostic("REV111", f"format {form.text} is not known here; this is {FORMAT}", form.span))
-        system, node = self.text("system", top, ""), self.text("node", top, "")
-        reviewer, role = self.text("reviewer", top), self.text("role", top)
-        if reviewer and (why := unreadable(reviewer)):
-            hint = "write the name in the letters of one script"
-            self.add("REV124", f"nobody can tell this reviewer's name: {why}", top["reviewer"].span, hint)
-        date = self.date("date", top)
-        valid_until = self.date("valid_until", top, past=False) if "valid_until" in top else None
-        if date and valid_until and valid_until < date:
-            self.add("REV112", "the review expires before its own date", top["valid_until"].span)
-        read = tuple(self.reading(p) for p in self.items("read", top, "what was read"))
-        clauses = self.clauses(top.get("clauses"))
-        checklist = tuple(self.question(p) for p in self.items("checklist", top, "what was asked"))
-        conclusion = self.word("conclusion", top, CONCLUSIONS)
-        conditions = tuple(self.sentence(p) for p in self.items("conditions", top, None))
-        remarks = self.text("remarks", top, "")
-        self.agree(conclusion, conditions, checklist, clauses, top)
-        if self.problems:
-            raise Rejected(*self.problems)
-        return Record(
-            system, node, reviewer, role, date or "", valid_until, read, clauses, checklist, conclusion, conditions,
-            remarks, self.piece.span,
-        )  # fmt: skip
 
-    def agree(
-        self,
-        conclusion: str,
-        conditions: tuple[str, ...],
-        checklist: tuple[Question, ...],
-        clauses: tuple[Judged, ...],
-        top: dict[str, Piece],
-    ) -> None:
-        """Report a conclusion that contradicts its own answers."""
-        place = top["conclusion"].span if "conclusion" in top else self.piece.span
-        if conclusion == "conditional" and not conditions:
-            self.add("REV113", "a conditional acceptance must list its 'conditions'", place)
-        if conclusion == "accepted":
-            if conditions:
-                self.add("REV113", "a review with conditions is 'conditional', not 'accepted'", place)
-            for number, question in enumerate(checklist, 1):
-                if not question.good:
-                    message = f"accepted, although question {number} is answered '{question.answer}'"
-                    hint = "conclude 'conditional' or 'rejected', or say 'wanted: no' where 'no' is the good answer"
-                    self.add("REV113", message, place, hint)
-        if checklist and all(question.answer == "n/a" for question in checklist):
-            self.add("REV113", "every question is answered 'n/a': nothing was reviewed", place)
-        for judged in clauses:
-            if judged.conclusion == "conditional" and not conditions:
-                self.add("REV113", f"'{judged.clause}' is accepted on conditions, but there are none", judged.span)
+def _reading(piece: Piece) -> Reading:
+    given = piece.data if isinstance(piece.data, dict) else {"file": piece.data}
+    return Reading(_text(given.get("file")) or None, _digest(given), _text(given.get("material")) or None, piece.span)
 
-    def reading(self, piece: Piece) -> Reading:
-        if piece.entries is None:
-            return Reading(self.sentence(piece) or None, None, None, piece.span)
-        entries = self.mapping(piece, ("file", "sha256", "material"))
-        if ("file" in entries) == ("material" in entries):
-            self.add("REV114", "name either a 'file' of the system's folder or 'material' kept elsewhere", piece.span)
-        file, material = self.text("file", entries, ""), self.text("material", entries, "")
-        return Reading(file or None, self.digest("sha256", entries), material or None, piece.span)
 
-    def clauses(self, piece: Piece | None) -> tuple[Judged, ...]:
-        if piece is None or (piece.entries is None and piece.value is None and piece.items is None):
-            return ()
-        if piece.entries is None:
-            self.add("REV115", "'clauses' must say, by guarantee, of which meaning it was judged", piece.span)
-            return ()
-        judged = []
-        for name, entry in piece.entries.items():
-            if entry.entries is None:
-                judged.append(Judged(name, self.digest(name, {name: entry}), None, "", piece.key_span(name)))
-                continue
-            inner = self.mapping(entry, ("meaning", "conclusion", "remark"))
-            conclusion = self.word("conclusion", inner, CONCLUSIONS) if "conclusion" in inner else None
-            remark = self.text("remark", inner, "")
-            judged.append(Judged(name, self.digest("meaning", inner), conclusion, remark, piece.key_span(name)))
-        return tuple(judged)
+def _judged(name: str, given: Any, span: Span) -> Judged:
+    given = given if isinstance(given, dict) else {"meaning": given}
+    return Judged(name, _digest(given, "meaning"), given.get("conclusion"), _text(given.get("remark")), span)
 
-    def question(self, piece: Piece) -> Question:
-        entries = self.mapping(piece, ("question", "answer", "wanted", "note"))
-        question = self.text("question", entries, where=piece)
-        answer = self.word("answer", entries, ANSWERS, where=piece)
-        wanted = self.word("wanted", entries, ("yes", "no")) if "wanted" in entries else "yes"
-        note = self.text("note", entries, "")
-        if answer and answer != wanted and not note:
-            self.add("REV116", f"the answer '{answer}' needs a 'note' that explains it", piece.span)
-        return Question(question, answer, wanted, note)
 
-    def mapping(self, piece: Piece, known: tuple[str, ...]) -> dict[str, Piece]:
-        if piece.entries is None:
-            self.add("REV111", f"expected keys and values ({', '.join(known)})", piece.span)
-            return {}
-        for key in piece.entries:
-            if key not in known:
-                value = piece.entries[key].data
-                comma = f"a text with a comma needs quotes here: “…, {key}”" if value is None else None
-                self.add("REV111", f"unknown key '{key}'", piece.key_span(key), comma or suggest(key, known))
-        return piece.entries
+def _question(given: dict[str, Any]) -> Question:
+    words = {True: "yes", False: "no"}
+    answer, wanted = (words.get(word, word) for word in (given["answer"], given.get("wanted", "yes")))
+    return Question(_text(given["question"]), answer, wanted, _text(given.get("note")))
 
-    def items(self, key: str, top: dict[str, Piece], wanted: str | None) -> list[Piece]:
-        piece = top.get(key)
-        if piece is None or not piece.items:
-            if wanted is not None:
-                place = piece.span if piece else self.piece.span
-                self.add("REV117", f"the review does not say {wanted}: '{key}' is missing or empty", place)
-            elif piece is not None and piece.items is None:
-                self.add("REV111", f"'{key}' must be a list", piece.span)
-            return []
-        return piece.items
 
-    def sentence(self, piece: Piece) -> str:
-        if piece.items is not None or piece.entries is not None or not piece.text.strip():
-            self.add("REV111", "expected text", piece.span)
-            return ""
-        return " ".join(piece.text.split())
+def _text(value: str | None) -> str:
+    return " ".join((value or "").split())
 
-    def text(self, key: str, top: dict[str, Piece], default: str | None = None, where: Piece | None = None) -> str:
-        piece = top.get(key)
-        empty = piece is None or (piece.items is None and piece.entries is None and not piece.text.strip())
-        if piece is None or empty:
-            if default is not None:
-                return default
-            place = piece.span if piece else (where or self.piece).span
-            self.add("REV117", f"'{key}' is missing or empty", place)
-            return ""
-        return self.sentence(piece)
 
-    def word(self, key: str, top: dict[str, Piece], known: tuple[str, ...], where: Piece | None = None) -> str:
-        text = self.text(key, top, where=where)
-        if not text:
-            return ""
-        # some editors write YAML's yes and no as true and false
-        text = {"true": "yes", "false": "no"}.get(text, text) if "yes" in known else text
-        if text not in known:
-            self.add("REV118", f"'{key}' cannot be '{text}'", top[key].span, f"one of {', '.join(known)}")
-            return ""
-        return text
+def _digest(given: dict[str, Any], key: str = "sha256") -> str | None:
+    """None if it has not been filled in yet."""
+    value = given.get(key) or ""
+    return value if len(value) > 1 else None
 
-    def date(self, key: str, top: dict[str, Piece], *, past: bool = True) -> str | None:
-        text = self.text(key, top)
-        if not text:
-            return None
-        if wrong := wrong_day(text, past=past):
-            self.add("REV112", f"'{key}': {wrong}", top[key].span)
-            return None
-        return text
 
-    def digest(self, key: str, top: dict[str, Piece]) -> str | None:
-        """None if it has not been filled in yet."""
-        piece = top.get(key)
-        if piece is None or (piece.items is None and piece.entries is None and piece.text.strip() in ("", "?", "~")):
-            return None
-        if piece.items is not None or piece.entries is not None or not _SHA256.fullmatch(piece.text):
-            hint = "'avow review stamp' fills digests in"
-            self.add("REV119", f"'{key}' must be a SHA-256 in 64 small hexadecimal digits", piece.span, hint)
-            return None
-        return piece.text
-
-    def add(self, code: str, message: str, span: Span, hint: str | None = None) -> None:
-        self.problems.append(Diagnostic(code, message, span, hint=hint))
+def _contradictions(record: Record, piece: Piece) -> Iterator[Diagnostic]:
+    """A name that cannot be told, impossible days, and a conclusion that contradicts its own answers."""
+    top = piece.entries or {}
+    place = top["conclusion"].span
+    if why := unreadable(record.reviewer):
+        hint = "write the name in the letters of one script"
+        yield Diagnostic("REV124", f"nobody can tell this reviewer's name: {why}", top["reviewer"].span, hint=hint)
+    days = {"date": wrong_day(record.date)}
+    if record.valid_until:
+        days["valid_until"] = wrong_day(record.valid_until, past=False)
+    yield from (Diagnostic("REV112", f"'{key}': {why}", top[key].span) for key, why in days.items() if why)
+    if record.valid_until and not any(days.values()) and record.valid_until < record.date:
+        yield Diagnostic("REV112", "the review expires before its own date", top["valid_until"].span)
+    for question, asked in zip(record.checklist, piece.each("checklist"), strict=True):
+        if question.answer != question.wanted and not question.note:
+            message = f"the answer '{question.answer}' needs a 'note' that explains it"
+            yield Diagnostic("REV116", message, asked.span)
+    if record.conclusion == "conditional" and not record.conditions:
+        yield Diagnostic("REV113", "a conditional acceptance must list its 'conditions'", place)
+    if record.conclusion == "accepted" and record.conditions:
+        yield Diagnostic("REV113", "a review with conditions is 'conditional', not 'accepted'", place)
+    for number, question in enumerate(record.checklist if record.conclusion == "accepted" else (), 1):
+        if not question.good:
+            message = f"accepted, although question {number} is answered '{question.answer}'"
+            hint = "conclude 'conditional' or 'rejected', or say 'wanted: no' where 'no' is the good answer"
+            yield Diagnostic("REV113", message, place, hint=hint)
+    if all(question.answer == "n/a" for question in record.checklist):
+        yield Diagnostic("REV113", "every question is answered 'n/a': nothing was reviewed", place)
+    for judged in record.clauses:
+        if judged.conclusion == "conditional" and not record.conditions:
+            message = f"'{judged.clause}' is accepted on conditions, but there are none"
+            yield Diagnostic("REV113", message, judged.span)
 
 
 # Whether a review is still about the current files and guarantees

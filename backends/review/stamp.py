@@ -132,7 +132,7 @@ def _stamp_clauses(piece: Piece, node: Node, guarantees: tuple[str, ...], editor
         elif clauses.entries is not None or (clauses.items is None and clauses.value is None):
             editor.replace(clauses.span, "\n" + "\n".join(lines))
         else:
-            raise Rejected(Diagnostic("REV115", "'clauses' must be keys and values", clauses.span))
+            raise Rejected(Diagnostic("REV111", "'clauses' must be keys and values", clauses.span))
         editor.said.extend(f"{name}: {meaning}" for name, meaning in fresh.items())
         return
     for name, meaning in fresh.items():
