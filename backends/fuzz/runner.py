@@ -254,7 +254,7 @@ def _all(
         for run in runs:
             if spent() > question.seconds:
                 break
-            replies = program.ask_all([{"command": command} for command in ("N", *run)])
+            replies = program.ask_all([{"command": command} for command in run])
             failed = next((r for r in replies if isinstance(r, SubjectFailed)), None)
             crash = program.crashed() if failed is not None else ""
             if failed is not None and (program.fault or not crash):
@@ -274,7 +274,7 @@ def shown(asked: Show, question: Question) -> Shown:
     program = Path(asked.program)
     channel = judge.Channel()
     with tempfile.TemporaryFile() as lines:
-        for k, line in enumerate(("N", *asked.commands)):
+        for k, line in enumerate(asked.commands):
             lines.write(f"{k}|{line}\n".encode())
         lines.flush()
         lines.seek(0)

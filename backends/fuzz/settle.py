@@ -7,7 +7,7 @@ import os
 import random
 import re
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TypeVar
@@ -33,11 +33,12 @@ from avow.isolation.outside import Outside
 from . import building
 from .building import Build, NotBuilt
 from .clang_tool import fuzzes, tools
-from .drawn import Drawn, Step, command
+from .drawn import NEW, Step, asking, command, steps
 from .reading import Reading, load
 from .runner import Answered, Campaign, Campaigned, Question, Run, Runs, Show, Shown
 from .tables import drawable
 from .tuning import (
+    DRAWN_TOGETHER,
     HANGS,
     LONGEST_RUN,
     MOST_CRASHES,
@@ -141,12 +142,11 @@ class Work:
         seeds = self._seeds(kept / "corpus", SEEDS if fuzzed else UNGUIDED)
         campaign = self._campaign(kept) if fuzzed else None
         faults = _files(kept, "fault-", 10)
-        found = [Drawn(data, made, reading.single) for data in (*seeds, *_files(kept / "corpus", "", MOST_JUDGED * 2))]
-        drawn = [one.steps(reading.asked, reading.steps) for one in found]
+        drawn = self._drawn(program, (*seeds, *_files(kept / "corpus", "", MOST_JUDGED * 2)))
         bench.recorded = recorded(self.job, [port.name for port in reading.asked])
         shown = _different([[dict(step) for step in run] for run in bench.recorded.runs])
         runs = _different([*shown, *self._earlier(), *bench.sweep(made, SWEPT), *drawn])[: MOST_JUDGED + SEEDS]
-        answer = self._asked(program, runs, built[Build.FILLED].program)
+        answer = self._asked(program, map(self._words, runs), built[Build.FILLED].program)
         judged = 0
         for run, reply in zip(runs, answer.runs, strict=False):
             bench.judge(run, reply)
@@ -157,7 +157,7 @@ class Work:
             words = bench.words(runs[answer.unsteady])
             why = "asked again, where what nothing was written to holds other bytes, it answers otherwise"
             raise Unanswered(Verdict.UNKNOWN, f"undeclared input: {why} ({words})")
-        fault = self._fault([Drawn(data, made, reading.single).steps(reading.asked, reading.steps) for data in faults])
+        fault = self._fault(self._drawn(program, faults))
         if campaign is not None and not faults and campaign.done < reading.runs and not bench.crash:
             raise Unanswered(Verdict.ERROR, "libFuzzer ended without having made its runs, and without a report")
         apart = bench.apart(self._special(bench, program)) if judged else []
@@ -225,10 +225,21 @@ class Work:
         self.isolation = min(self.isolation, isolation, key=lambda level: level.rank)
 
     def _words(self, run: Sequence[Step]) -> tuple[str, ...]:
-        return tuple(command(self.reading.asked, step) for step in run)
+        return (NEW, *(command(self.reading.asked, step) for step in run))
 
-    def _asked(self, program: Path, runs: Sequence[list[Step]], twin: Path | None = None) -> Answered:
-        ask = Runs(str(program), str(twin or ""), tuple(map(self._words, runs)), MOST_CRASHES)
+    def _drawn(self, program: Path, data: Sequence[bytes]) -> list[list[Step]]:
+        """The runs that the harness draws of these bytes."""
+        found: list[list[Step]] = []
+        for at in range(0, len(data), DRAWN_TOGETHER):
+            part = data[at : at + DRAWN_TOGETHER]
+            (answer,) = self._asked(program, [tuple(map(asking, part))]).runs or (Run((), ""),)
+            if len(answer.replies) != len(part):
+                raise Unanswered(Verdict.UNKNOWN, "the time ended before its inputs were drawn", True)
+            found += [list(steps(self.reading.asked, reply)) for reply in answer.replies]
+        return found
+
+    def _asked(self, program: Path, runs: Iterable[tuple[str, ...]], twin: Path | None = None) -> Answered:
+        ask = Runs(str(program), str(twin or ""), tuple(runs), MOST_CRASHES)
         answer = self._ask(Answered, ask)
         self._kept_apart(answer.isolation)
         self.observed.update(dict.fromkeys(answer.observed))
@@ -258,7 +269,7 @@ class Work:
             while tries and tried < SHORTENED:
                 run = tries.pop(0)
                 tried += 1
-                found = bench.again(name, run, self._asked(program, [run]).runs)
+                found = bench.again(name, run, self._asked(program, [self._words(run)]).runs)
                 if found is not None and (best is None or len(found.run) < len(best.run)):
                     best = found
                     tries = [best.run[:k] + best.run[k + 1 :] for k in range(len(best.run) - 1)]
@@ -299,7 +310,7 @@ class Work:
     def _special(self, bench: Bench, program: Path) -> list[tuple[list[Step], str, str, Run]]:
         """Each REAL input in turn NaN and infinite, with a few steps' other inputs; with the replies."""
         asked = bench.special()
-        replies = self._asked(program, [run for run, _, _ in asked]).runs if asked else ()
+        replies = self._asked(program, [self._words(run) for run, _, _ in asked]).runs if asked else ()
         return [(run, name, word, reply) for (run, name, word), reply in zip(asked, replies, strict=False)]
 
 

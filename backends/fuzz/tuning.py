@@ -45,8 +45,8 @@ SWEPT = 600
 WRITTEN = 60
 """Constants of contract, parameters and source that are drawn, with their neighbours: a byte distinguishes them."""
 
-REMEMBERED = 16
-"""Numbers of a run from which later ones are drawn; the harness has as many (`native/avow_drawn.hpp`)."""
+DRAWN_TOGETHER = 500
+"""Runs whose inputs are drawn in one request: a few megabytes of text for long sequences."""
 
 MOST_CRASHES = 3
 """Runs that end the plain program, after which no more are run: each costs a new process, and one refutes."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import random
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -11,13 +10,10 @@ import pytest
 from helpers import some
 
 from avow.backends.fuzz.clang_tool import clang
-from avow.backends.fuzz.drawn import Drawn, command
-from avow.backends.fuzz.reading import load
-from avow.backends.fuzz.tables import drawable
 from avow.base.verdict import Object, Verdict
 from avow.isolation.observed import look
 from avow.isolation.tracing import traces
-from fuzz.cpp_nodes import DEBOUNCER, FIVE, LIMITER, MEDIAN, SCAN, WATCHDOG, Cpp, adapter
+from fuzz.cpp_nodes import DEBOUNCER, FIVE, LIMITER, WATCHDOG, Cpp, adapter
 
 pytestmark = [
     pytest.mark.slow,
@@ -201,16 +197,3 @@ def test_it_does_not_compile(tmp_path: Path) -> None:
     assert "src/adapter.hpp:1" in found["same"].summary
     found = replace(LIMITER, adapter="struct Node {};\n").outcomes(tmp_path / "unnamed")
     assert "adapter.hpp defines no `struct AvowNode`" in found["same"].summary
-
-
-@pytest.mark.parametrize("cpp", [MEDIAN, SCAN, DEBOUNCER], ids=lambda cpp: cpp.node)
-def test_bytes_are_the_same_run_twice(cpp: Cpp, tmp_path: Path) -> None:
-    """What Python draws of some bytes can be said, and is no more than the harness' own limits."""
-    reading = load(cpp.written(tmp_path))
-    made, chance = drawable(reading), random.Random(1)
-    for _ in range(200):
-        data = chance.randbytes(chance.randrange(60))
-        steps = Drawn(data, made, reading.single).steps(reading.asked, reading.steps)
-        assert 1 <= len(steps) <= reading.steps
-        assert steps == Drawn(data, made, reading.single).steps(reading.asked, reading.steps)
-        assert all(command(reading.asked, step).startswith("S") for step in steps)

@@ -1,5 +1,5 @@
 // Inputs of a run drawn from bytes: mostly numbers at which something may change, and what lies beside them or beside
-// earlier inputs. `backends/fuzz/drawn.py` draws the same of the same bytes.
+// earlier inputs. The same bytes are the same run.
 #pragma once
 
 #include <cmath>
@@ -95,6 +95,28 @@ class Drawn {
   double reals_[16] = {};
   std::uint64_t reals_count_ = 0;
   std::int64_t last_ = 0;
+};
+
+// The steps of a run.
+class Run {
+ public:
+  Run(const std::uint8_t* data, std::size_t size) : drawn_(data, size), steps_(1 + int(drawn_.take(1) % AVOW_STEPS)) {}
+
+  // Whether there is another step.
+  bool next() {
+    bool more = at_ < steps_ && (at_ == 0 || drawn_.left());
+    ++at_;
+    return more;
+  }
+
+  Value value(const Port& port, const Values& before) {
+    auto last = before.all().find(port.name);
+    return drawn_.value(port, last == before.all().end() ? nullptr : &last->second);
+  }
+
+ private:
+  Drawn drawn_;
+  int steps_, at_ = 0;
 };
 
 }  // namespace avow

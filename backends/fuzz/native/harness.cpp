@@ -45,13 +45,12 @@ extern "C" int LLVMFuzzerInitialize(int*, char***) {
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   ++runs;
-  avow::Drawn drawn(data, size);
-  int steps = 1 + int(drawn.take(1) % AVOW_STEPS);
+  avow::Run run(data, size);
   within = true;
   AvowNode node = avow::made<AvowNode>();
   within = false;
   avow::Inputs in, given;
-  for (int k = 0; k < steps && (k == 0 || drawn.left()); ++k) {
+  while (run.next()) {
     avow::Outputs before;
     within = true;
     avow::remembered(node, before);
@@ -63,8 +62,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
         if (held != before.all().end()) in.put(port.name, held->second);
         continue;
       }
-      auto last = in.all().find(port.name);
-      avow::Value value = drawn.value(port, last == in.all().end() ? nullptr : &last->second);
+      avow::Value value = run.value(port, in);
       in.put(port.name, value);
       given.put(port.name, std::move(value));
     }

@@ -3,7 +3,8 @@
 //   replay FROM TO MARK     lines come through descriptor FROM, answers go through TO
 //
 // A line is `TURN COMMAND...`: `N` makes a node, `S VALUE...` is a step with the inputs that are no memory, in order,
-// which is left out where the assumptions seem not to hold.
+// which is left out where the assumptions seem not to hold. `D BYTES` asks for the inputs that the harness draws of
+// these bytes (hexadecimal); nothing of the node is run.
 #include <cerrno>
 #include <cstdio>
 #include <cstdlib>
@@ -19,6 +20,7 @@
 #include <sstream>
 #include <unistd.h>
 
+#include "avow_drawn.hpp"
 #include "avow_guide.hpp"
 
 std::uint8_t avow::Guide::marks[8192];
@@ -134,11 +136,29 @@ std::string why(const char* kind, const char* name, const char* what) {
   return text + "}";
 }
 
+std::string drawn(std::istringstream& words) {
+  std::string hex;
+  words >> hex;
+  std::vector<std::uint8_t> data;
+  for (std::size_t k = 0; k + 1 < hex.size(); k += 2)
+    data.push_back(std::uint8_t(std::strtoul(hex.substr(k, 2).c_str(), nullptr, 16)));
+  std::string text = "[";
+  avow::Values last;
+  avow::Run run(data.data(), data.size());
+  while (run.next()) {
+    for (std::size_t p = 0; p < avow::INPUT_COUNT; ++p)
+      if (!avow::INPUTS[p].held) last.put(avow::INPUTS[p].name, run.value(avow::INPUTS[p], last));
+    text += (text.size() > 1 ? ", " : "") + object(last);
+  }
+  return text + "]";
+}
+
 std::unique_ptr<AvowNode> node;
 
 std::string answered(std::istringstream& words) {
   std::string command, text;
   words >> command;
+  if (command == "D") return drawn(words);
   try {
     if (command == "N" || !node) {
       node.reset();
