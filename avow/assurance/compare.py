@@ -124,8 +124,8 @@ class Change:
                 return f"{self.kind}: {self.subject}: {self.before} → {self.after}"
 
 
-_OF_RUN = ("integrity", "derivations", "proved", "certified")
-"""Gates about a run's findings: a case that is concluded without a run cannot answer them."""
+_OF_RUN = ("integrity", "certified")
+"""Gates about a run's audit: a case that is concluded without a run cannot answer them."""
 _RANK: Mapping[str, int] = {level: at for at, level in enumerate(Level)}
 
 

@@ -4,27 +4,23 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Iterator
-from datetime import date
 from pathlib import Path
 
 import click
 
-from avow import __version__
-from avow.assurance.case import conclude
 from avow.assurance.codec import read_case
 from avow.assurance.compare import Change, Snapshot, compare, of_case, of_ledger, of_signature
-from avow.assurance.facts import facts_of_system
-from avow.assurance.model import RunInfo
 from avow.assurance.signed import KEYS, newest_signed, read_signed
 from avow.base import git
 from avow.base.codec import document, to_json
 from avow.base.diagnostics import Diagnostic, Rejected
-from avow.base.files import read_regular, write_out
+from avow.base.files import write_out
 from avow.base.plain import count
 from avow.base.tuning.shown import DIFF_REASONS
 from avow.base.workspace import Workspace, workspace
 from avow.cli.options import PathArgument, json_option
 from avow.evidence.ledger import Entry, Ledger, readable
+from avow.pipeline.assess import as_it_is
 from avow.pipeline.workload import survey
 
 
@@ -160,18 +156,7 @@ def _of_contracts(contracts: Workspace, place: Workspace) -> dict[str, Snapshot]
         if isinstance(surveyed, Rejected):
             found[folder.name] = Snapshot(folder.name, {}, {})
             continue
-        system, plan = surveyed.system, surveyed.system.plan
-        files = (*plan.contract_files, plan.path, *plan.included)
-        case = conclude(
-            facts_of_system(
-                system,
-                surveyed.catalogue.obligations,
-                _records(place.ledger(system.name)),
-                keys=surveyed.keys,
-                today=date.today(),
-                run=RunInfo("diff", "", 0.0, __version__),
-                sources={contracts.relative(path): read_regular(path).decode("utf-8", "replace") for path in files},
-            )
-        )
-        found[system.name] = of_case(case)
+        with readable(place.ledger(surveyed.system.name)):
+            case = as_it_is(surveyed, contracts, place.ledger(surveyed.system.name))
+        found[case.system] = of_case(case)
     return found

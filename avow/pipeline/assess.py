@@ -135,7 +135,14 @@ def case_of(state: State, surveyed: Survey) -> Case:
     return made[1] if made is not None and made[0] == _key(state, surveyed, basis) else build(state, surveyed, basis)
 
 
-def build(state: State, surveyed: Survey, basis: _Basis) -> Case:
+def as_it_is(surveyed: Survey, contracts: Workspace, ledger: Path) -> Case:
+    """The case that a run would report if every answer were reused: contracts and plan in one place, and a ledger,
+    which is not audited. Raises Rejected as `build` does."""
+    state = State(contracts)
+    return build(state, surveyed, _basis(state, surveyed, Ledger(ledger)), audited=False)
+
+
+def build(state: State, surveyed: Survey, basis: _Basis, audited: bool = True) -> Case:
     """The case, from contract, plan and ledger. Raises Rejected for a policy that cannot be used."""
     system, workspace, ledger = surveyed.system, state.workspace, basis.ledger
     plan = system.plan
@@ -163,7 +170,7 @@ def build(state: State, surveyed: Survey, basis: _Basis) -> Case:
             discharging=_discharging(system),
             methods=_methods(state, surveyed),
             tools=_tools(),
-            discrepancies=discrepancies(workspace, ledger, surveyed),
+            discrepancies=discrepancies(workspace, ledger, surveyed) if audited else None,
             digests={path: sha256(data) for path, data in texts.items()},
             ledger_head=ledger.head,
             graph_svg=_picture(system),
