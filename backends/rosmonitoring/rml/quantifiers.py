@@ -24,12 +24,12 @@ from avow.language.operators import OPERATORS, Why
 
 from ..tuning import COMPARISONS
 from . import syntax as rml
-from .symbols import Points, Scalar, Symbol, Table, Tracked, Variant, code, constant, equal
+from .symbols import Numbers, Points, Symbol, Table, Tracked, code, equal, made, numbers, places
 
 _INFINITE = (s.RealSort, s.IntegerSort, s.NaturalSort)
 _NOT_LIFTED = "it is in a quantified formula within a term"
 
-Bound = Mapping[str, Symbol]
+Bound = Mapping[str, Numbers]
 
 _Case = tuple[rml.Condition, list[Part], Bound]
 """One way in which a part can hold: the condition for it, the remaining parts, and the variables that it fixes."""
@@ -58,11 +58,11 @@ class Eliminator:
 
     def _without_functions(self, formula: t.Term) -> t.Term:
         """Replace each value of a function with a result by a choice: at its known arguments, or elsewhere."""
-        made = dict(self.symbols)
+        known = dict(self.symbols)
 
-        def part(name: str, symbol: Symbol, sort: s.Sort) -> t.Variable:
+        def part(name: str, symbol: Numbers, sort: s.Sort) -> t.Variable:
             variable = t.Variable(t.Role.INPUT, name, sort)
-            made[variable.qualified] = symbol
+            known[variable.qualified] = symbol
             return variable
 
         def chosen(term: t.Term) -> t.Term:
@@ -82,7 +82,7 @@ class Eliminator:
                     return term
 
         changed = transform(formula, chosen)
-        self.symbols = made
+        self.symbols = known
         return changed
 
     def _formula(self, term: t.Term, bound: Bound) -> rml.Condition:
@@ -103,8 +103,7 @@ class Eliminator:
             case t.Compare():
                 return self._compare(term, bound)
             case t.In(item=item, collection=t.SetTerm(items=items) | t.SequenceTerm(items=items)):
-                left_side = self._value(item, bound)
-                return rml.some([equal(left_side, self._value(each, bound)) for each in items])
+                return rml.some([self._equal(item, each, bound) for each in items])
             case t.Apply():
                 return self._apply(term, bound)
             case t.Variable(sort=s.BoolSort()):
@@ -123,32 +122,29 @@ class Eliminator:
         return rml.every([rml.some([rml.opposite(one), other]), rml.some([one, rml.opposite(other)])])
 
     def _compare(self, term: t.Compare, bound: Bound) -> rml.Condition:
-        made = made_with(term)
-        if made is not None:
-            known = self._value(term.left, bound)
-            assert isinstance(known, Variant)
+        constructor = made_with(term)
+        if constructor is not None:
             assert isinstance(term.left.sort, s.DataSort)
-            return rml.compare(term.operator, known.tag, rml.literal(code(term.left.sort, made)))
+            known = self._value(term.left, bound)[0]
+            return rml.compare(term.operator, known, rml.literal(code(term.left.sort, constructor)))
         if term.left.sort == s.BOOL:
             same = self._iff(term.left, term.right, bound)
             return same if term.operator == "==" else rml.opposite(same)
         if term.operator in ("==", "!="):
-            same = equal(self._value(term.left, bound), self._value(term.right, bound))
+            same = self._equal(term.left, term.right, bound)
             return same if term.operator == "==" else rml.opposite(same)
         return rml.compare(term.operator, self._number(term.left, bound), self._number(term.right, bound))
+
+    def _equal(self, left: t.Term, right: t.Term, bound: Bound) -> rml.Condition:
+        return equal(self._value(left, bound), self._value(right, bound), left.sort)
 
     def _apply(self, term: t.Apply, bound: Bound) -> rml.Condition:
         arguments = [self._value(a, bound) for a in term.arguments]
         tracked = self._tracked(term)
         if tracked is not None:
             return tracked.flag(tuple(arguments))
-        points = self._points(term)
-        return rml.some(
-            [
-                rml.every([holds, *(equal(a, p) for a, p in zip(arguments, parts, strict=True))])
-                for holds, parts in points.tuples
-            ]
-        )
+        points, sorts = self._points(term), [argument.sort for argument in term.arguments]
+        return rml.some([rml.every([holds, *map(equal, arguments, parts, sorts)]) for holds, parts in points.tuples])
 
     def _tracked(self, term: t.Apply) -> Tracked | None:
         found = self.symbols.get(term.function.qualified) if isinstance(term.function, t.Variable) else None
@@ -161,7 +157,7 @@ class Eliminator:
                 return found
         raise rml.NotRml("an application of a function that is no relation")
 
-    def _value(self, term: t.Term, bound: Bound) -> Symbol:
+    def _value(self, term: t.Term, bound: Bound) -> Numbers:
         self._tick()
         match term:
             case t.Variable(role=t.Role.BOUND, name=name):
@@ -169,23 +165,19 @@ class Eliminator:
                     return bound[name]
                 raise rml.NotRml(f"nothing fixes {name}")
             case t.Variable():
-                return self.symbols[term.qualified]
+                found = self.symbols[term.qualified]
+                if not isinstance(found, tuple):
+                    raise rml.NotRml("an equation between relations")
+                return found
             case t.EnumValue(name=name, sort=sort):
-                return Scalar(rml.literal(code(sort, name)))
+                return (rml.literal(code(sort, name)),)
             case t.Construct(constructor=name, arguments=arguments, sort=sort):
-                given = tuple(self._value(a, bound) for a in arguments)
-                rows = tuple(
-                    given if c.name == name else tuple(Scalar(rml.ZERO) for _ in c.parameters)
-                    for c in sort.constructors
-                )
-                return Variant(rml.literal(code(sort, name)), rows)
+                return made(sort, name, (self._value(argument, bound) for argument in arguments))
             case t.Argument(value=whole, constructor=name, position=position):
-                known = self._value(whole, bound)
-                assert isinstance(known, Variant)
                 assert isinstance(whole.sort, s.DataSort)
-                return known.arguments[code(whole.sort, name) - 1][position]
+                return (self._value(whole, bound)[places(whole.sort, name)[position]],)
             case _:  # a number, or refused by name
-                return Scalar(self._number(term, bound))
+                return (self._number(term, bound),)
 
     def _number(self, term: t.Term, bound: Bound) -> rml.Numeric:
         match term:
@@ -199,8 +191,8 @@ class Eliminator:
                 return self._calculate(operator, self._number(left, bound), self._number(right, bound), term)
             case t.Variable() | t.Argument():
                 found = self._value(term, bound)
-                if isinstance(found, Scalar):
-                    return found.number
+                if len(found) == 1:
+                    return found[0]
             case t.Operation(operator=name):
                 said = OPERATORS[name].rml
                 raise rml.NotRml(f"`{name}`: {said.reason if isinstance(said, Why) else _NOT_LIFTED}")
@@ -275,12 +267,12 @@ class Eliminator:
         for name, variable in free.items():
             finite = finite_values(variable.sort)
             if any(name in p.names for p in pending) and finite is not None:
-                values = [constant(v, variable.sort) for v in finite]
+                values = [numbers(v, variable.sort) for v in finite]
                 found = [self._solve(pending, variables, {**bound, name: value}, facts) for value in values]
                 return rml.every([known, rml.some(found)])
             if any(name in p.names for p in pending) and isinstance(variable.sort, _INFINITE):
                 anything = rml.variable(f"{name}?{self._work}")
-                open_ = self._solve(pending, variables, {**bound, name: Scalar(anything)}, facts)
+                open_ = self._solve(pending, variables, {**bound, name: (anything,)}, facts)
                 left = rml.without_exclusions(open_, anything)
                 if left is not None:
                     return rml.every([known, left])

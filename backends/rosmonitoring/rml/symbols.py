@@ -8,7 +8,7 @@ scenario's tables are known in advance. Anything else (a relation that holds of 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from itertools import product
@@ -35,7 +35,6 @@ from .syntax import (
     every,
     key,
     literal,
-    some,
     string,
     value_of,
     variable,
@@ -54,7 +53,6 @@ class Case:
 
 def choice_cases(rule: Choice, sort: DataSort, stem: str) -> list[Case]:
     found: list[Case] = []
-    width = {c.name: len(c.parameters) for c in sort.constructors}
     for constructor in sort.constructors:
         if constructor.name not in rule.arguments:
             continue
@@ -74,11 +72,8 @@ def choice_cases(rule: Choice, sort: DataSort, stem: str) -> list[Case]:
         ]
         for parts in product(*per_field):
             whole = together((), parts)
-            values: list[Numeric] = [literal(code(sort, constructor.name))]
-            for other in sort.constructors:
-                mine = other.name == constructor.name
-                values += whole.values if mine else [ZERO] * width[other.name]
-            found.append(Case((tag, *whole.fields), tuple(values), whole.binds, whole.guard))
+            values = made(sort, constructor.name, [whole.values])
+            found.append(Case((tag, *whole.fields), values, whole.binds, whole.guard))
     return found
 
 
@@ -155,26 +150,16 @@ def _object(tree: dict[str, object]) -> str:
     return "{" + ", ".join(f"{k}: {_object(v) if isinstance(v, dict) else v}" for k, v in tree.items()) + "}"
 
 
-@dataclass(frozen=True, slots=True)
-class Scalar:
-    """A number, a code, or a truth value as a number."""
-
-    number: Numeric
-
-
-@dataclass(frozen=True, slots=True)
-class Variant:
-    """An algebraic value: the constructor's code, and for each constructor its arguments."""
-
-    tag: Numeric
-    arguments: tuple[tuple[Symbol, ...], ...]
+Numbers = tuple[Numeric, ...]
+"""A value: a number, a code or a truth value, or, for an algebraic type, the constructor's code and the arguments of
+every constructor (0 for those of others than the value's own)."""
 
 
 @dataclass(frozen=True, slots=True)
 class Points:
     """A relation that holds of these tuples, each on a condition."""
 
-    tuples: tuple[tuple[Condition, tuple[Symbol, ...]], ...]
+    tuples: tuple[tuple[Condition, tuple[Numbers, ...]], ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -185,15 +170,15 @@ class Tracked:
     prefix: str
     flags: dict[tuple[Fraction, ...], str] = field(default_factory=dict, hash=False)
 
-    def flag(self, arguments: tuple[Symbol, ...]) -> Condition:
+    def flag(self, arguments: tuple[Numbers, ...]) -> Condition:
         """The condition that the relation holds there. Raises NotRml."""
         at: list[Fraction] = []
         for argument in arguments:
-            if not isinstance(argument, Scalar) or not isinstance(argument.number, t.Literal):
+            if len(argument) > 1 or not isinstance(argument[0], t.Literal):
                 raise NotRml(
                     "it asks a relation that holds of all tuples seen for a tuple that is not known beforehand"
                 )
-            at.append(value_of(argument.number))
+            at.append(value_of(argument[0]))
         name = self.flags.setdefault(tuple(at), f"{self.prefix}_{len(self.flags) + 1}")
         if len(self.flags) > TRACKED_TUPLES:
             raise NotRml(f"it asks a relation for more than {TRACKED_TUPLES} tuples")
@@ -204,11 +189,11 @@ class Tracked:
 class Table:
     """A function with a result: its value at these arguments, and its value elsewhere."""
 
-    points: tuple[tuple[tuple[Symbol, ...], Symbol], ...]
-    elsewhere: Symbol
+    points: tuple[tuple[tuple[Numbers, ...], Numbers], ...]
+    elsewhere: Numbers
 
 
-Symbol = Scalar | Variant | Points | Tracked | Table
+Symbol = Numbers | Points | Tracked | Table
 
 
 def code(sort: s.EnumSort | s.DataSort, name: str) -> int:
@@ -216,41 +201,55 @@ def code(sort: s.EnumSort | s.DataSort, name: str) -> int:
     return (sort.members if isinstance(sort, s.EnumSort) else tuple(c.name for c in sort.constructors)).index(name) + 1
 
 
+def places(sort: s.DataSort, constructor: str) -> range:
+    """The places of a constructor's arguments among the numbers of an algebraic value."""
+    before = sort.constructors[: code(sort, constructor) - 1]
+    first = 1 + sum(len(each.parameters) for each in before)
+    return range(first, first + len(sort.constructor(constructor).parameters))
+
+
+def made(sort: s.DataSort, constructor: str, arguments: Iterable[Numbers]) -> Numbers:
+    """A value made by a constructor."""
+    known = dict(zip(places(sort, constructor), (number for each in arguments for number in each), strict=True))
+    width = 1 + sum(len(each.parameters) for each in sort.constructors)
+    return (literal(code(sort, constructor)), *(known.get(at, ZERO) for at in range(1, width)))
+
+
 def constant(value: Value, sort: s.Sort) -> Symbol:
     """A known value. Raises NotRml."""
     match value:
-        case bool() | int() | Fraction():
-            return Scalar(literal(value))
-        case Element(name=name) if isinstance(sort, s.EnumSort):
-            return Scalar(literal(code(sort, name)))
-        case Data(constructor=name, arguments=arguments) if isinstance(sort, s.DataSort):
-            chosen = sort.constructor(name)
-            parts = tuple(constant(a, part) for a, part in zip(arguments, chosen.parameters, strict=True))
-            others = tuple(
-                parts if c.name == name else tuple(blank(p) for p in c.parameters) for c in sort.constructors
-            )
-            return Variant(literal(code(sort, name)), others)
         case FunctionValue(table=table, default=False) if isinstance(sort, s.FunctionSort):
-            points = [k for k, v in table.items() if v is True]
-            tuples = tuple(
-                (t.TRUE, tuple(constant(a, part) for a, part in zip(k, sort.parameters, strict=True))) for k in points
-            )
-            return Points(tuples)
+            return Points(tuple((t.TRUE, _row(k, sort)) for k, holds in table.items() if holds is True))
         case FunctionValue(table=table, default=default) if isinstance(sort, s.FunctionSort) and sort.result != s.BOOL:
-            known = tuple(
-                (tuple(constant(a, part) for a, part in zip(k, sort.parameters, strict=True)), constant(v, sort.result))
-                for k, v in table.items()
-            )
-            return Table(known, constant(default, sort.result))
+            known = tuple((_row(k, sort), numbers(v, sort.result)) for k, v in table.items())
+            return Table(known, numbers(default, sort.result))
+        case _:  # a value of numbers
+            return numbers(value, sort)
+
+
+def _row(arguments: Sequence[Value], sort: s.FunctionSort) -> tuple[Numbers, ...]:
+    return tuple(numbers(argument, part) for argument, part in zip(arguments, sort.parameters, strict=True))
+
+
+def numbers(value: Value, sort: s.Sort) -> Numbers:
+    """A known value that is no function. Raises NotRml."""
+    match value:
+        case bool() | int() | Fraction():
+            return (literal(value),)
+        case Element(name=name) if isinstance(sort, s.EnumSort):
+            return (literal(code(sort, name)),)
+        case Data(constructor=name, arguments=arguments) if isinstance(sort, s.DataSort):
+            _check_arguments(sort)
+            parts = zip(arguments, sort.constructor(name).parameters, strict=True)
+            return made(sort, name, (numbers(argument, part) for argument, part in parts))
         case _:
             raise NotRml("a value that RML's equations cannot carry")
 
 
-def blank(sort: s.Sort) -> Symbol:
-    """The number in the places of an absent value. Raises NotRml."""
-    if isinstance(sort, s.NotScalar):
+def _check_arguments(sort: s.DataSort) -> None:
+    """Raises NotRml."""
+    if any(isinstance(part, s.NotScalar) for each in sort.constructors for part in each.parameters):
         raise NotRml("an argument of a constructor that is no number, truth value or enumeration")
-    return Scalar(ZERO)
 
 
 def carried(rule: Rule, rules: dict[str, Rule], prefix: str) -> Symbol:
@@ -270,24 +269,20 @@ def carried(rule: Rule, rules: dict[str, Rule], prefix: str) -> Symbol:
             elsewhere = source.elsewhere if isinstance(source, Fields) else None
             if elsewhere is None:
                 raise NotRml(f"{name} is a function without a value `elsewhere`")
-            return Table(((parts[:-1], parts[-1]),), constant(elsewhere, sort.result))
+            return Table(((parts[:-1], parts[-1]),), numbers(elsewhere, sort.result))
         return Points(((compare("==", variable(f"{prefix}_p"), ONE), parts),))
     return _named(sort, prefix, name)
 
 
-def _named(sort: s.Sort, prefix: str, name: str) -> Symbol:
+def _named(sort: s.Sort, prefix: str, name: str) -> Numbers:
     match sort:
         case s.BoolSort() | s.RealSort() | s.IntegerSort() | s.NaturalSort() | s.EnumSort():
-            return Scalar(variable(prefix))
+            return (variable(prefix),)
         case s.DataSort(constructors=constructors):
-            arguments = []
-            for at, constructor in enumerate(constructors, start=1):
-                row: list[Symbol] = []
-                for k, parameter in enumerate(constructor.parameters, start=1):
-                    blank(parameter)
-                    row.append(Scalar(variable(f"{prefix}_{at}_{k}")))
-                arguments.append(tuple(row))
-            return Variant(variable(f"{prefix}_t"), tuple(arguments))
+            _check_arguments(sort)
+            each = enumerate(constructors, start=1)
+            parts = [f"{at}_{k}" for at, made in each for k, _ in enumerate(made.parameters, start=1)]
+            return tuple(variable(f"{prefix}_{part}") for part in ("t", *parts))
         case s.StringSort() | s.OpaqueSort() | s.FunctionSort() | s.TupleSort() | s.SequenceSort() | s.SetSort():
             raise NotRml(f"{name} is of a sort that RML's equations cannot carry")
         case _:
@@ -307,36 +302,25 @@ def no_pattern(rule: Fields) -> str:
     return ""
 
 
-def equal(left: Symbol, right: Symbol) -> Condition:
-    """The condition that two symbols of one sort have the same value. Raises NotRml."""
-    match left, right:
-        case Scalar(number=one), Scalar(number=other):
-            return compare("==", one, other)
-        case Variant(), Variant():
-            same = compare("==", left.tag, right.tag)
-            cases = []
-            for at, (mine, theirs) in enumerate(zip(left.arguments, right.arguments, strict=True), start=1):
-                other_tag = compare("!=", left.tag, literal(at))
-                cases.append(some([other_tag, every([equal(a, b) for a, b in zip(mine, theirs, strict=True)])]))
-            return every([same, *cases])
-        case _:
-            raise NotRml("an equation between relations")
+def equal(left: Numbers, right: Numbers, sort: s.Sort) -> Condition:
+    """The condition that two values of a sort are the same. If one's constructor is known, only its arguments count."""
+    compared: Iterable[int] = range(len(left))
+    tag = next((one[0] for one in (left, right) if isinstance(one[0], t.Literal)), None)
+    if isinstance(sort, s.DataSort) and tag is not None:
+        compared = 0, *places(sort, sort.constructors[int(value_of(tag)) - 1].name)
+    return every([compare("==", left[at], right[at]) for at in compared])
 
 
 def components(symbol: Symbol) -> tuple[str, ...]:
-    """The names of the parts that an equation carries for it, in order."""
+    """The names of the parts that an equation carries for it, in order; none for what is known in advance."""
     match symbol:
-        case Scalar(number=t.Variable(name=name)):
-            return (name,)
-        case Variant(tag=t.Variable(name=name), arguments=arguments):
-            return (name, *(part for row in arguments for a in row for part in components(a)))
         case Tracked(flags=flags):
             return tuple(flags.values())
         case Points(tuples=((t.Compare(left=t.Variable(name=flag)), parts),)):
-            return (flag, *(part for p in parts for part in components(p)))
+            return (flag, *(name for part in parts for name in components(part)))
         case Table(points=((arguments, result),)):
-            return tuple(part for symbol in (*arguments, result) for part in components(symbol))
-        case Scalar() | Variant() | Points() | Table():  # known in advance
+            return tuple(name for part in (*arguments, result) for name in components(part))
+        case Points() | Table():  # known in advance
             return ()
-        case _:
-            assert_never(symbol)
+        case _:  # a value's numbers
+            return tuple(number.name for number in symbol if isinstance(number, t.Variable))

@@ -11,7 +11,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import count, product
+from itertools import chain, count, product
 from pathlib import PurePath
 from typing import assert_never
 
@@ -402,26 +402,20 @@ def _calculated(operator: str, left: rml.Numeric, right: rml.Numeric) -> rml.Num
 def _seen_at_start(symbol: sym.Tracked, first: Value, sort: Sort) -> dict[str, rml.Numeric]:
     known = sym.constant(first, sort)
     assert isinstance(known, sym.Points)
-    seen = set()
-    for _, parts in known.tuples:
-        seen.add(tuple(n.value for p in parts for n in _numbers(p, sort) if isinstance(n, t.Literal)))
+    seen = {tuple(n.value for n in chain(*parts) if isinstance(n, t.Literal)) for _, parts in known.tuples}
     return {flag: rml.literal(at in seen) for at, flag in symbol.flags.items()}
 
 
 def _numbers(symbol: sym.Symbol, sort: Sort) -> list[rml.Numeric]:
     """A known value as the numbers that its components carry."""
     match symbol:
-        case sym.Scalar(number=number):
-            return [number]
-        case sym.Variant(tag=tag, arguments=arguments):
-            return [tag, *(n for row in arguments for a in row for n in _numbers(a, sort))]
         case sym.Points(tuples=()) if isinstance(sort, FunctionSort):
             return [rml.ZERO] * (1 + len(sort.parameters))
         case sym.Points(tuples=((_, parts),)):
-            return [rml.ONE, *(n for p in parts for n in _numbers(p, sort))]
+            return [rml.ONE, *chain(*parts)]
         case sym.Table(points=((arguments, result),)):
-            return [n for part in (*arguments, result) for n in _numbers(part, sort)]
+            return [*chain(*arguments), *result]
         case sym.Points() | sym.Tracked() | sym.Table():
             raise rml.NotRml("an initial value with more than one tuple")
-        case _:
-            assert_never(symbol)
+        case _:  # a value's numbers
+            return [*symbol]
