@@ -21,7 +21,7 @@ class Hoare(Backend):
 
     name = "hoare"
     title = "Hoare triples from the guarantee, proved of an imperative program by weakest preconditions"
-    version = "6"
+    version = "7"
     strength = Verdict.PROVED
     uses_scenario = False
     uses_wiring = False

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -19,7 +20,7 @@ from avow.evidence.obligation import Obligation
 from avow.evidence.record import OUTPUT_FOR_EVERY_INPUT
 from avow.formulas.formula import conjunction, free_variables, negation
 from avow.formulas.values import show
-from avow.language.terms import FALSE, TRUE, Not, Role, Term, Variable
+from avow.language.terms import FALSE, Not, Role, Term, Variable
 from avow.solving.checking import z3_version
 from avow.solving.limits import effort_told, from_seconds, spent, until
 from avow.solving.questions import Entailment, entails
@@ -29,9 +30,8 @@ from avow.solving.smtlib import formulas_script
 from avow.solving.translation import Unsupported, new_session
 
 from .memory import knowing, remembered
-from .outline import one_line, outline
 from .program import While, statements
-from .triples import Triple
+from .triples import Triple, one_line
 from .tuning import BRIEFLY_SECONDS
 from .witness import Breach, breach
 from .work import Work, left_unassigned, load, other_numbers, run_conditions
@@ -39,9 +39,6 @@ from .wp import Condition, TooLarge, conditions
 
 GIVEN = frozenset({Verdict.PROVED, Verdict.PARTIAL, Verdict.JUSTIFIED})
 """What an obligation whose triples are proved gets: whether its loops are shown to end makes the difference."""
-
-
-UNFAITHFUL = "Avow's simplified triple does not say what the contract's formulas say: a fault of Avow, please report it"
 
 
 def problems(job: Job) -> tuple[Diagnostic, ...]:
@@ -78,7 +75,7 @@ def _undated(job: Job) -> tuple[Diagnostic, ...]:
 
 @new_session()
 def files(job: Job) -> Mapping[str, str]:
-    """Triples, proof outlines and verification conditions of every obligation; nothing where the job is at fault."""
+    """Triples and verification conditions of every obligation; nothing where the job is at fault."""
     try:
         work = load(job)
         all_triples = work.triples
@@ -90,20 +87,12 @@ def files(job: Job) -> Mapping[str, str]:
     for found in (*all_triples.values(), work.kept):
         for triple in found:
             made[f"{file_stem(triple.name)}.hoare"] = _triple_text(triple, work)
-            if triple.fidelity != TRUE:
-                same = Condition("fidelity", (), triple.fidelity, "the triple says what the contract's formulas say")
-                made[f"{file_stem(triple.name)}.fidelity.smt2"] = _script(triple, same)
-            try:
-                made[f"{file_stem(triple.name)}.outline.txt"] = outline(triple, work.checked.program.body)
+            with contextlib.suppress(TooLarge, RecursionError):  # the verdict says so
                 for condition in conditions(triple, work.checked.program.body):
                     made[f"{file_stem(triple.name)}.{condition.name}.smt2"] = _script(triple, condition)
-            except (TooLarge, RecursionError) as error:
-                made[f"{file_stem(triple.name)}.outline.txt"] = f"no outline: {error}\n"
-    try:
+    with contextlib.suppress(TooLarge, RecursionError):
         for condition in run_conditions(work.every_run, work.checked.program):
             made[f"every-run.{condition.name}.smt2"] = _script(work.every_run, condition)
-    except (TooLarge, RecursionError):
-        pass  # each triple's outline says so
     return made
 
 
@@ -272,7 +261,7 @@ def _proved(settled: Settled, wanted: Sequence[Condition], deadline: float, impo
     """What Z3 has proved; an error where a second solver finds values for which a condition fails, or such as are
     `impossible` where the triple is vacuous."""
     broken = [conjunction((*c.hypotheses, negation(c.goal))) for c in wanted]
-    if contradicted([negation(settled.triple.fidelity), impossible, *broken], effort=_left(deadline)):
+    if contradicted([impossible, *broken], effort=_left(deadline)):
         return Settled(settled.triple, Verdict.ERROR, CONTRADICTED)
     return settled
 
@@ -326,27 +315,12 @@ def _termination(work: Work) -> tuple[str, ...]:
 
 
 def _settled(how: Callable[[Triple, Work, float], Settled], triple: Triple, work: Work, deadline: float) -> Settled:
-    """What is found of a triple; of the stated one, where the simplified one is not shown to claim the same."""
     try:
-        unfaithful = _unfaithful(triple, work.settler, deadline)
-        if unfaithful is Verdict.REFUTED:
-            return Settled(triple, Verdict.ERROR, UNFAITHFUL)
-        return how(triple if unfaithful is None else triple.as_stated, work, deadline)
+        return how(triple, work, deadline)
     except TooLarge as error:
         return Settled(triple, Verdict.UNKNOWN, str(error))
     except RecursionError:
         return Settled(triple, Verdict.UNKNOWN, "its formulas are nested too deeply for this method")
-
-
-def _unfaithful(triple: Triple, settler: Settler, deadline: float) -> Verdict | None:
-    """None where the triple is shown to claim what the contract's own formulas claim; else what the solver says."""
-    if triple.fidelity == TRUE:
-        return None
-    limit = min(5000, _left(deadline))
-    if settler.settles([], triple.fidelity, effort=limit) == "unsat":
-        return None
-    answer = entails([], triple.fidelity, effort=limit, seed=settler.seed)
-    return None if answer.verdict is Verdict.PROVED else answer.verdict
 
 
 def _triple(triple: Triple, work: Work, deadline: float) -> Settled:

@@ -102,7 +102,7 @@ def establish(
     def lasts(each: Invariant, node: Node) -> bool:
         found = kept(each, "invariant", steps, node, checked)
         try:
-            return all(proves(c) for t in found for c in conditions(t.as_stated, checked.program.body))
+            return all(proves(c) for t in found for c in conditions(t, checked.program.body))
         except TooLarge:
             return False
 

@@ -7,34 +7,21 @@ between outputs and inputs two.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import replace
+from collections.abc import Iterator, Sequence
 
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.records import dataclass
 from avow.formulas.disjunctions import conjuncts
 from avow.formulas.formula import conjunction, equation, free_variables, negation, substitute
-from avow.formulas.one_point_rule import solved
 from avow.formulas.renaming import rename_apart
 from avow.formulas.traversal import Steps, run
 from avow.language import terms as t
 from avow.language.contract import Clause, Node
+from avow.language.printer import show_term
 from avow.language.sorts import INTEGER, NATURAL, FunctionSort
 
 from .checker import Checked
 from .program import Reading, variable
-from .simplify import simplify
-
-
-@dataclass(frozen=True, slots=True)
-class Stated:
-    """A triple's formulas as the contract has them, before anything was simplified. `fixed` are the constants of outer
-    quantifiers that an equation of `pre` determined and that the simplified triple no longer has, each with its value
-    in terms of those after it."""
-
-    pre: t.Term
-    post: t.Term
-    fixed: tuple[tuple[t.Variable, t.Term], ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,28 +35,6 @@ class Triple:
     post: t.Term
     ghosts: tuple[tuple[t.Variable, t.Variable], ...]
     """(variable, its ghost): also part of the precondition, as equations."""
-    stated: Stated | None = None
-    """What it was simplified from; None where it is as the contract has it."""
-
-    @property
-    def as_stated(self) -> Triple:
-        """The triple of the contract's own formulas: what is to be proved."""
-        return self if self.stated is None else replace(self, pre=self.stated.pre, post=self.stated.post, stated=None)
-
-    @property
-    def fidelity(self) -> t.Term:
-        """What must be valid for the simplified triple to claim what the stated one claims, no less and no more. The
-        program changes nothing that `pre` speaks of, so that the precondition still holds at the end."""
-        if self.stated is None or self.stated == Stated(self.pre, self.post):
-            return t.TRUE
-        was, fixed = self.stated, [equation(c, value) for c, value in self.stated.fixed]
-        return conjunction(
-            (
-                t.Implies(was.pre, conjunction((*fixed, self.pre))),
-                t.Implies(conjunction((*fixed, self.pre)), was.pre),
-                t.Implies(was.pre, t.Iff(was.post, self.post)),
-            )
-        )
 
     @property
     def full_pre(self) -> t.Term:
@@ -83,17 +48,22 @@ def triples(obligation: str, clause: Clause, node: Node, checked: Checked) -> tu
     names = set(checked.program.names)
     assumed = [translate(a, checked.reading, names) for a in node.assumptions]
     parts = tuple(_split(rename_apart(clause.formula, names)))
-    found: dict[tuple[t.Term, t.Term, Stated], None] = {}
-    for outer, conditions, consequent in parts:
+    found: dict[tuple[t.Term, t.Term], None] = {}
+    for conditions, consequent in parts:
         goal = _translate_formula(consequent, checked.reading, clause)
         read = [_translate_formula(c, checked.reading, clause) for c in conditions]
-        found.setdefault(_solved(outer, (*assumed, *read), goal))
+        found.setdefault((_joined((*assumed, *read)), goal))
     ghosts = tuple(sorted(checked.program.ghosts.items(), key=lambda pair: pair[0].name))
     count = len(found)
     return tuple(
-        Triple(clause.name if count == 1 else f"{clause.name}.{k}", obligation, pre, post, ghosts, stated)
-        for k, (pre, post, stated) in enumerate(found, start=1)
+        Triple(clause.name if count == 1 else f"{clause.name}.{k}", obligation, pre, post, ghosts)
+        for k, (pre, post) in enumerate(found, start=1)
     )
+
+
+def _joined(parts: Sequence[t.Term]) -> t.Term:
+    """All of them, equal parts once."""
+    return conjunction(dict.fromkeys(piece for part in parts for piece in conjuncts(part, True)))
 
 
 def every_run(node: Node, checked: Checked) -> Triple:
@@ -103,37 +73,36 @@ def every_run(node: Node, checked: Checked) -> Triple:
     names = set(checked.program.names)
     assumed = [translate(a, checked.reading, names) for a in node.assumptions]
     ghosts = tuple(sorted(checked.program.ghosts.items(), key=lambda pair: pair[0].name))
-    stated = Stated(conjunction(assumed), t.TRUE)
-    return Triple("every-run", "", simplify(stated.pre), t.TRUE, ghosts, stated)
+    return Triple("every-run", "", _joined(assumed), t.TRUE, ghosts)
 
 
 # -- the guarantee, taken apart ----------------------------------------------------------------------------------------
 
-_Part = tuple[tuple[t.Variable, ...], tuple[t.Term, ...], t.Term]
-"""Constants for outer quantifiers, conditions on inputs, consequent; still in the contract's words."""
+_Part = tuple[tuple[t.Term, ...], t.Term]
+"""Conditions on inputs, and consequent; still in the contract's words."""
 
 
 def _split(formula: t.Term) -> Iterator[_Part]:
-    stack: list[_Part] = [((), (), formula)]
+    stack: list[_Part] = [((), formula)]
     while stack:
-        outer, conditions, goal = stack.pop()
+        conditions, goal = stack.pop()
         match goal:
-            case t.Quantified(quantifier=t.Quantifier.FORALL, variables=variables, body=body):
-                stack.append(((*outer, *variables), conditions, body))
+            case t.Quantified(quantifier=t.Quantifier.FORALL, body=body):
+                stack.append((conditions, body))  # the variables are constants of the triple
             case t.And(items=items):
-                stack.extend((outer, conditions, item) for item in reversed(items))
+                stack.extend((conditions, item) for item in reversed(items))
             case t.Implies(left=left, right=right):
                 early, late = _sides(left)
                 if late:
-                    yield outer, (*conditions, *early), t.Implies(conjunction(late), right)
+                    yield (*conditions, *early), t.Implies(conjunction(late), right)
                 else:
-                    stack.append((outer, (*conditions, *early), right))
+                    stack.append(((*conditions, *early), right))
             case t.Iff(left=left, right=right) if _is_input(left) != _is_input(right):
                 cause, effect = (left, right) if _is_input(left) else (right, left)
-                stack.append((outer, (*conditions, negation(cause)), negation(effect)))
-                stack.append((outer, (*conditions, cause), effect))
+                stack.append(((*conditions, negation(cause)), negation(effect)))
+                stack.append(((*conditions, cause), effect))
             case _:  # proved as a whole
-                yield outer, conditions, goal
+                yield conditions, goal
 
 
 def _sides(antecedent: t.Term) -> tuple[list[t.Term], list[t.Term]]:
@@ -147,6 +116,11 @@ def _is_input(term: t.Term) -> bool:
 
 
 # -- the contract's words in the program's -----------------------------------------------------------------------------
+
+
+def one_line(term: t.Term) -> str:
+    """A term on one line, in mathematical notation."""
+    return show_term(term, "unicode").replace("\n", " ")
 
 
 def translate(clause: Clause, reading: Reading, names: set[str]) -> t.Term:
@@ -210,23 +184,3 @@ def _missing(port: t.Variable, clause: Clause) -> Diagnostic:
         clause.span,
         hint=f'map it under `variables`: "{port.qualified}": …, or use a variable of that name',
     )
-
-
-# -- constants that an equation determines -----------------------------------------------------------------------------
-
-
-def _solved(
-    outer: tuple[t.Variable, ...], hypotheses: tuple[t.Term, ...], goal: t.Term
-) -> tuple[t.Term, t.Term, Stated]:
-    """Simplify, and put away constants of outer quantifiers that an equation determines (the one-point rule)."""
-    was_pre = conjunction(hypotheses)
-    pre, post, fixed = simplify(was_pre), simplify(goal), list[tuple[t.Variable, t.Term]]()
-    for constant in outer:
-        for part in conjuncts(pre, True):
-            found = solved(part, (constant,)) if constant in part.children else None
-            # the sorts must agree: an INTEGER in place of a NATURAL would widen the claim
-            if found is not None and found.values[constant].sort == constant.sort:
-                pre, post = (simplify(substitute(term, found.values)) for term in (pre, post))
-                fixed += found.values.items()
-                break
-    return pre, post, Stated(was_pre, goal, tuple(fixed))

@@ -20,9 +20,8 @@ from avow.solving.replay import replay
 
 from .guesses import NUMERIC, expressions, filled, fits, guesses, numbers, starting_from, stored
 from .interpreter import Endless, Fault, Machine, NoEnd, State
-from .outline import one_line
 from .program import Assign, Program, Update, has_loops, statements
-from .triples import Triple
+from .triples import Triple, one_line
 from .tuning import ENDLESS_RUNS
 from .wp import Condition
 
@@ -72,7 +71,7 @@ def _shown(triple: Triple, program: Program, machine: Machine, values: Mapping[t
         return Breach(start, None, str(endless))
     except (NoEnd, NotEvaluable):
         return None
-    if not _holds(negation(triple.as_stated.post), end):
+    if not _holds(negation(triple.post), end):
         return None
     last = {s.target for s in statements(program.body) if isinstance(s, Assign | Update)}
     outcome = ", ".join(
@@ -82,17 +81,15 @@ def _shown(triple: Triple, program: Program, machine: Machine, values: Mapping[t
 
 
 def _first_state(triple: Triple, program: Program, values: Mapping[t.Variable, Value]) -> State | None:
-    """The program's first state on these values, with the ghosts and the constants that simplifying put away; None
-    where it is not certain that the stated precondition holds of them."""
+    """The program's first state on these values, with the ghosts; None where it is not certain that the precondition
+    holds of them."""
     start: State = {v.name: value for v, value in values.items()}
     try:
         for variable, ghost in program.ghosts.items():
             start[ghost.name] = start[variable.name]
-        for constant, value in reversed(triple.stated.fixed if triple.stated else ()):
-            start[constant.name] = evaluate(value, start)
-    except (KeyError, NotEvaluable):
+    except KeyError:
         return None
-    return start if _holds(triple.as_stated.pre, start) else None
+    return start if _holds(triple.pre, start) else None
 
 
 def _holds(term: t.Term, state: Mapping[str, Value]) -> bool:
