@@ -15,8 +15,7 @@ Apart from it and from `drawn`, on purpose, stand
   clauses are read here: `calculus.test_random_systems` (delays, subsystems), `calculus.test_random_runs` (functions and
   sequences within a scenario's domains, so with formulas of its own), `temporal.test_systems` and `test_timed_systems`
   (two nodes whose clauses have memory), `adversarial.drawn` (all that a system may have, and edits of it);
-- oracles whose subject is no typed term: `differential.oracle` (what was written, before Avow's parser saw it, and
-  programs that run), FRET's intervals in `fretish.test_meaning`;
+- an oracle whose subject is no typed term: FRET's intervals in `fretish.test_meaning`;
 - generators of terms that no text of a contract would be: those of `evaluate.test_against_z3` and
   `logic.test_one_point`.
 """
