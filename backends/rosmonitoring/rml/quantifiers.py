@@ -7,7 +7,7 @@ variable, the guarantee is refused with the reason; nothing is approximated.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from avow.base.tuning.bounds import ATOMS_MADE
@@ -15,6 +15,7 @@ from avow.evaluation.evaluate import finite_values
 from avow.formulas.cases import TooManyCases, lifted
 from avow.formulas.disjunctions import Part, alternatives, conjunction
 from avow.formulas.formula import conjunction as every_of
+from avow.formulas.formula import disjunction
 from avow.formulas.one_point_rule import made_with, solved
 from avow.formulas.renaming import bound_names, rename_apart
 from avow.formulas.traversal import transform
@@ -31,8 +32,8 @@ _NOT_LIFTED = "it is in a quantified formula within a term"
 
 Bound = Mapping[str, Numbers]
 
-_Case = tuple[rml.Condition, list[Part], Bound]
-"""One way in which a part can hold: the condition for it, the remaining parts, and the variables that it fixes."""
+_Case = tuple[list[Part], Bound]
+"""One way in which a part can hold: the remaining parts, and the variables that it fixes."""
 
 
 @dataclass(slots=True)
@@ -45,7 +46,7 @@ class Eliminator:
     def condition(self, formula: t.Term) -> rml.Condition:
         """Raises NotRml with the reason if the formula is not expressible."""
         try:
-            found = self._formula(rename_apart(lifted(self._without_functions(formula))), {})
+            found = self._formula(rename_apart(lifted(self._in_values(formula))), {})
         except TooManyCases:
             raise rml.NotRml(
                 f"its conditionals (`if`, `min`, `max`, `abs`) make more than {ATOMS_MADE} comparisons"
@@ -56,29 +57,35 @@ class Eliminator:
             raise rml.NotRml(f"the condition without quantifiers has {rml.size(found)} parts, more than {COMPARISONS}")
         return found
 
-    def _without_functions(self, formula: t.Term) -> t.Term:
-        """Replace each value of a function with a result by a choice: at its known arguments, or elsewhere."""
+    def _in_values(self, formula: t.Term) -> t.Term:
+        """Replace each application of a relation by its known tuples, and of a function with a result by a choice: at
+        its known arguments, or elsewhere."""
         known = dict(self.symbols)
 
-        def part(name: str, symbol: Numbers, sort: s.Sort) -> t.Variable:
+        def part(name: str, value: Numbers, sort: s.Sort) -> t.Variable:
             variable = t.Variable(t.Role.INPUT, name, sort)
-            known[variable.qualified] = symbol
+            known[variable.qualified] = value
             return variable
 
+        def same(term: t.Apply, k: int, row: Sequence[Numbers]) -> Iterator[t.Term]:
+            for n, (argument, value) in enumerate(zip(term.arguments, row, strict=True)):
+                yield t.Compare("==", argument, part(f"{_name(term)} argument {k} {n}", value, argument.sort))
+
         def chosen(term: t.Term) -> t.Term:
-            match term:
-                case t.Apply(function=t.Variable(sort=s.FunctionSort(parameters=sorts, result=sort), qualified=of)) if (
-                    isinstance(table := self.symbols.get(of), Table)
-                ):
-                    value: t.Term = part(f"{of} elsewhere", table.elsewhere, sort)
-                    for k, (arguments, result) in enumerate(table.points):
-                        names = enumerate(zip(term.arguments, arguments, sorts, strict=True))
-                        here = (
-                            t.Compare("==", a, part(f"{of} argument {k} {n}", p, item)) for n, (a, p, item) in names
-                        )
-                        value = t.Conditional(every_of(here), part(f"{of} value {k}", result, sort), value, sort)
-                    return value
-                case _:  # any other term stays as it is
+            if not isinstance(term, t.Apply):
+                return term
+            match self.symbols.get(of := _name(term)):
+                case Points(tuples=tuples):
+                    holds = (part(f"{of} holds {k}", (flag,), s.BOOL) for k, (flag, _) in enumerate(tuples))
+                    rows = (same(term, k, row) for k, (_, row) in enumerate(tuples))
+                    return disjunction(every_of((flag, *row)) for flag, row in zip(holds, rows, strict=True))
+                case Table(points=points, elsewhere=elsewhere):
+                    choice: t.Term = part(f"{of} elsewhere", elsewhere, term.sort)
+                    for k, (row, result) in enumerate(points):
+                        there = part(f"{of} value {k}", result, term.sort)
+                        choice = t.Conditional(every_of(same(term, k, row)), there, choice, term.sort)
+                    return choice
+                case _:  # any other application stays as it is
                     return term
 
         changed = transform(formula, chosen)
@@ -139,23 +146,10 @@ class Eliminator:
         return equal(self._value(left, bound), self._value(right, bound), left.sort)
 
     def _apply(self, term: t.Apply, bound: Bound) -> rml.Condition:
-        arguments = [self._value(a, bound) for a in term.arguments]
-        tracked = self._tracked(term)
-        if tracked is not None:
-            return tracked.flag(tuple(arguments))
-        points, sorts = self._points(term), [argument.sort for argument in term.arguments]
-        return rml.some([rml.every([holds, *map(equal, arguments, parts, sorts)]) for holds, parts in points.tuples])
-
-    def _tracked(self, term: t.Apply) -> Tracked | None:
-        found = self.symbols.get(term.function.qualified) if isinstance(term.function, t.Variable) else None
-        return found if isinstance(found, Tracked) else None
-
-    def _points(self, term: t.Apply) -> Points:
-        if isinstance(term.function, t.Variable):
-            found = self.symbols.get(term.function.qualified)
-            if isinstance(found, Points):
-                return found
-        raise rml.NotRml("an application of a function that is no relation")
+        tracked = self.symbols.get(_name(term))
+        if not isinstance(tracked, Tracked):
+            raise rml.NotRml("an application of a function that is no relation")
+        return tracked.flag(tuple(self._value(argument, bound) for argument in term.arguments))
 
     def _value(self, term: t.Term, bound: Bound) -> Numbers:
         self._tick()
@@ -250,10 +244,7 @@ class Eliminator:
             others = [*pending[:at], *pending[at + 1 :]]
             cases = self._binders(part, free, bound)
             if cases is not None:
-                found = [
-                    rml.every([holds, self._solve([*more, *others], variables, now, rml.every([facts, holds]))])
-                    for holds, more, now in cases
-                ]
+                found = [self._solve([*more, *others], variables, now, facts) for more, now in cases]
                 return rml.every([known, rml.some(found)])
         for at, part in enumerate(pending):
             others = [*pending[:at], *pending[at + 1 :]]
@@ -286,21 +277,6 @@ class Eliminator:
     def _binders(self, part: Part, free: Mapping[str, t.Variable], bound: Bound) -> list[_Case] | None:
         """The ways in which a part can hold, each with the variables that it fixes; None if the part fixes nothing."""
         match part.term:
-            case t.Apply(
-                function=t.Variable(
-                    role=t.Role.INPUT | t.Role.OUTPUT, sort=s.FunctionSort(parameters=sorts)
-                ) as relation,
-                arguments=arguments,
-            ) if part.positive:
-                if self._tracked(part.term) is not None:
-                    return None
-                cases = []
-                for k, (holds, row) in enumerate(self._points(part.term).tuples):
-                    names = (f"{relation.qualified} row {k} {n}" for n in range(len(row)))
-                    point = tuple(t.Variable(t.Role.BOUND, name, sort) for name, sort in zip(names, sorts, strict=True))
-                    here = {**bound, **{v.name: symbol for v, symbol in zip(point, row, strict=True)}}
-                    sort = s.TupleSort(sorts)
-                    cases.append(self._case(t.TupleTerm(arguments, sort), t.TupleTerm(point, sort), free, here, holds))
             case t.Compare(operator=operator, left=left, right=right) if left.sort != s.BOOL and operator == (
                 "==" if part.positive else "!="
             ):
@@ -312,17 +288,20 @@ class Eliminator:
         found = [case for case in cases if case is not None]
         return found if len(found) == len(cases) else None
 
-    def _case(
-        self, left: t.Term, right: t.Term, free: Mapping[str, t.Variable], bound: Bound, holds: rml.Condition = t.TRUE
-    ) -> _Case | None:
+    def _case(self, left: t.Term, right: t.Term, free: Mapping[str, t.Variable], bound: Bound) -> _Case | None:
         """The case that both sides are equal, if that fixes a variable."""
         found = solved(t.Compare("==", left, right), free.values())
         if found is None:
             return None
         more = [Part(term, True, bound_names(term)) for term in found.rest]
-        return holds, more, {**bound, **{v.name: self._value(term, bound) for v, term in found.values.items()}}
+        return more, {**bound, **{v.name: self._value(term, bound) for v, term in found.values.items()}}
 
     def _tick(self) -> None:
         self._work += 1
         if self._work > 200_000:
             raise rml.NotRml("the quantifiers unfold into too many cases")
+
+
+def _name(term: t.Apply) -> str:
+    """The name of the variable that is applied; empty for another function."""
+    return term.function.qualified if isinstance(term.function, t.Variable) else ""

@@ -157,9 +157,9 @@ every constructor (0 for those of others than the value's own)."""
 
 @dataclass(frozen=True, slots=True)
 class Points:
-    """A relation that holds of these tuples, each on a condition."""
+    """A relation that holds of these tuples, each if a number is 1."""
 
-    tuples: tuple[tuple[Condition, tuple[Numbers, ...]], ...]
+    tuples: tuple[tuple[Numeric, tuple[Numbers, ...]], ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -219,7 +219,7 @@ def constant(value: Value, sort: s.Sort) -> Symbol:
     """A known value. Raises NotRml."""
     match value:
         case FunctionValue(table=table, default=False) if isinstance(sort, s.FunctionSort):
-            return Points(tuple((t.TRUE, _row(k, sort)) for k, holds in table.items() if holds is True))
+            return Points(tuple((ONE, _row(k, sort)) for k, holds in table.items() if holds is True))
         case FunctionValue(table=table, default=default) if isinstance(sort, s.FunctionSort) and sort.result != s.BOOL:
             known = tuple((_row(k, sort), numbers(v, sort.result)) for k, v in table.items())
             return Table(known, numbers(default, sort.result))
@@ -270,7 +270,7 @@ def carried(rule: Rule, rules: dict[str, Rule], prefix: str) -> Symbol:
             if elsewhere is None:
                 raise NotRml(f"{name} is a function without a value `elsewhere`")
             return Table(((parts[:-1], parts[-1]),), numbers(elsewhere, sort.result))
-        return Points(((compare("==", variable(f"{prefix}_p"), ONE), parts),))
+        return Points(((variable(f"{prefix}_p"), parts),))
     return _named(sort, prefix, name)
 
 
@@ -316,7 +316,7 @@ def components(symbol: Symbol) -> tuple[str, ...]:
     match symbol:
         case Tracked(flags=flags):
             return tuple(flags.values())
-        case Points(tuples=((t.Compare(left=t.Variable(name=flag)), parts),)):
+        case Points(tuples=((t.Variable(name=flag), parts),)):
             return (flag, *(name for part in parts for name in components(part)))
         case Table(points=((arguments, result),)):
             return tuple(name for part in (*arguments, result) for name in components(part))
