@@ -32,9 +32,6 @@ _NOT_LIFTED = "it is in a quantified formula within a term"
 
 Bound = Mapping[str, Numbers]
 
-_Case = tuple[list[Part], Bound]
-"""One way in which a part can hold: the remaining parts, and the variables that it fixes."""
-
 
 @dataclass(slots=True)
 class Eliminator:
@@ -58,8 +55,8 @@ class Eliminator:
         return found
 
     def _in_values(self, formula: t.Term) -> t.Term:
-        """Replace each application of a relation by its known tuples, and of a function with a result by a choice: at
-        its known arguments, or elsewhere."""
+        """Replace each application of a relation by its known tuples, of a function with a result by a choice (at its
+        known arguments, or elsewhere), and membership in a listed collection by equations."""
         known = dict(self.symbols)
 
         def part(name: str, value: Numbers, sort: s.Sort) -> t.Variable:
@@ -72,6 +69,8 @@ class Eliminator:
                 yield t.Compare("==", argument, part(f"{_name(term)} argument {k} {n}", value, argument.sort))
 
         def chosen(term: t.Term) -> t.Term:
+            if isinstance(term, t.In) and isinstance(term.collection, t.SetTerm | t.SequenceTerm):
+                return disjunction(t.Compare("==", term.item, each) for each in term.collection.items)
             if not isinstance(term, t.Apply):
                 return term
             match self.symbols.get(of := _name(term)):
@@ -109,8 +108,6 @@ class Eliminator:
                 return self._iff(left, right, bound)
             case t.Compare():
                 return self._compare(term, bound)
-            case t.In(item=item, collection=t.SetTerm(items=items) | t.SequenceTerm(items=items)):
-                return rml.some([self._equal(item, each, bound) for each in items])
             case t.Apply():
                 return self._apply(term, bound)
             case t.Variable(sort=s.BoolSort()):
@@ -138,12 +135,9 @@ class Eliminator:
             same = self._iff(term.left, term.right, bound)
             return same if term.operator == "==" else rml.opposite(same)
         if term.operator in ("==", "!="):
-            same = self._equal(term.left, term.right, bound)
+            same = equal(self._value(term.left, bound), self._value(term.right, bound), term.left.sort)
             return same if term.operator == "==" else rml.opposite(same)
         return rml.compare(term.operator, self._number(term.left, bound), self._number(term.right, bound))
-
-    def _equal(self, left: t.Term, right: t.Term, bound: Bound) -> rml.Condition:
-        return equal(self._value(left, bound), self._value(right, bound), left.sort)
 
     def _apply(self, term: t.Apply, bound: Bound) -> rml.Condition:
         tracked = self.symbols.get(_name(term))
@@ -218,11 +212,6 @@ class Eliminator:
 
     def _exists(self, variables: Sequence[t.Variable], body: t.Term, positive: bool, bound: Bound) -> rml.Condition:
         parts, inner = conjunction(body, positive)
-        if len(parts) == 1:
-            options = alternatives(parts[0].term, parts[0].positive)
-            if options is not None:
-                own = (*variables, *inner)
-                return rml.some([self._exists(own, option, truth, bound) for option, truth in options])
         return self._solve(parts, (*variables, *inner), bound, t.TRUE)
 
     def _solve(
@@ -242,10 +231,9 @@ class Eliminator:
             return known
         for at, part in enumerate(pending):
             others = [*pending[:at], *pending[at + 1 :]]
-            cases = self._binders(part, free, bound)
-            if cases is not None:
-                found = [self._solve([*more, *others], variables, now, facts) for more, now in cases]
-                return rml.every([known, rml.some(found)])
+            if (fixed := self._fixed(part, free, bound)) is not None:
+                more, now = fixed
+                return rml.every([known, self._solve([*more, *others], variables, now, facts)])
         for at, part in enumerate(pending):
             others = [*pending[:at], *pending[at + 1 :]]
             options = alternatives(part.term, part.positive)
@@ -274,27 +262,17 @@ class Eliminator:
         found = self._formula(part.term, bound)
         return found if part.positive else rml.opposite(found)
 
-    def _binders(self, part: Part, free: Mapping[str, t.Variable], bound: Bound) -> list[_Case] | None:
-        """The ways in which a part can hold, each with the variables that it fixes; None if the part fixes nothing."""
-        match part.term:
-            case t.Compare(operator=operator, left=left, right=right) if left.sort != s.BOOL and operator == (
-                "==" if part.positive else "!="
-            ):
-                cases = [self._case(left, right, free, bound)]
-            case t.In(item=item, collection=t.SetTerm(items=items) | t.SequenceTerm(items=items)) if part.positive:
-                cases = [self._case(item, each, free, bound) for each in items]
-            case _:  # fixes no variable
-                return None
-        found = [case for case in cases if case is not None]
-        return found if len(found) == len(cases) else None
-
-    def _case(self, left: t.Term, right: t.Term, free: Mapping[str, t.Variable], bound: Bound) -> _Case | None:
-        """The case that both sides are equal, if that fixes a variable."""
-        found = solved(t.Compare("==", left, right), free.values())
+    def _fixed(self, part: Part, free: Mapping[str, t.Variable], bound: Bound) -> tuple[list[Part], Bound] | None:
+        """For an equation, the remaining parts, and the values with those of the variables that it fixes; None if the
+        part fixes none."""
+        term, operator = part.term, "==" if part.positive else "!="
+        if not isinstance(term, t.Compare) or term.operator != operator or term.left.sort == s.BOOL:
+            return None
+        found = solved(t.Compare("==", term.left, term.right), free.values())
         if found is None:
             return None
-        more = [Part(term, True, bound_names(term)) for term in found.rest]
-        return more, {**bound, **{v.name: self._value(term, bound) for v, term in found.values.items()}}
+        more = [Part(rest, True, bound_names(rest)) for rest in found.rest]
+        return more, {**bound, **{v.name: self._value(value, bound) for v, value in found.values.items()}}
 
     def _tick(self) -> None:
         self._work += 1

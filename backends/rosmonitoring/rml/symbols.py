@@ -11,7 +11,7 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
-from itertools import product
+from itertools import chain, product
 from typing import assert_never
 
 from avow.formulas.values import Data, Element, FunctionValue, Value
@@ -311,16 +311,21 @@ def equal(left: Numbers, right: Numbers, sort: s.Sort) -> Condition:
     return every([compare("==", left[at], right[at]) for at in compared])
 
 
-def components(symbol: Symbol) -> tuple[str, ...]:
-    """The names of the parts that an equation carries for it, in order; none for what is known in advance."""
+def parts(symbol: Symbol) -> tuple[Numeric, ...]:
+    """The numbers that an equation carries for it, in order; none for what is known in advance."""
     match symbol:
         case Tracked(flags=flags):
-            return tuple(flags.values())
-        case Points(tuples=((t.Variable(name=flag), parts),)):
-            return (flag, *(name for part in parts for name in components(part)))
+            return tuple(map(variable, flags.values()))
+        case Points(tuples=((flag, row),)):
+            return (flag, *chain(*row))
         case Table(points=((arguments, result),)):
-            return tuple(name for part in (*arguments, result) for name in components(part))
+            return (*chain(*arguments), *result)
         case Points() | Table():  # known in advance
             return ()
         case _:  # a value's numbers
-            return tuple(number.name for number in symbol if isinstance(number, t.Variable))
+            return symbol
+
+
+def components(symbol: Symbol) -> tuple[str, ...]:
+    """Their names."""
+    return tuple(number.name for number in parts(symbol) if isinstance(number, t.Variable))

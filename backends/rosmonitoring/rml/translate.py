@@ -20,7 +20,7 @@ from avow.evaluation.evaluate import free_names
 from avow.formulas.values import Value
 from avow.language import terms as t
 from avow.language.contract import Clause
-from avow.language.sorts import DataSort, FunctionSort, RealSort, Sort, StringSort
+from avow.language.sorts import DataSort, RealSort, Sort, StringSort
 from avow.language.terms import Role
 from avow.ros.calls import is_part
 
@@ -294,7 +294,10 @@ class _Machine:
                 if isinstance(symbol, sym.Tracked):
                     values.update(_seen_at_start(symbol, first, sort))
                 else:
-                    values.update(zip(sym.components(symbol), _numbers(sym.constant(first, sort), sort), strict=True))
+                    known = sym.constant(first, sort)
+                    if not (parts := sym.parts(known)) and known != sym.Points(()):
+                        raise rml.NotRml("an initial value with more than one tuple")
+                    values.update(zip(sym.components(symbol), parts, strict=bool(parts)))
         return [values[name] for name in state]
 
     def _drafts(
@@ -404,18 +407,3 @@ def _seen_at_start(symbol: sym.Tracked, first: Value, sort: Sort) -> dict[str, r
     assert isinstance(known, sym.Points)
     seen = {tuple(n.value for n in chain(*parts) if isinstance(n, t.Literal)) for _, parts in known.tuples}
     return {flag: rml.literal(at in seen) for at, flag in symbol.flags.items()}
-
-
-def _numbers(symbol: sym.Symbol, sort: Sort) -> list[rml.Numeric]:
-    """A known value as the numbers that its components carry."""
-    match symbol:
-        case sym.Points(tuples=()) if isinstance(sort, FunctionSort):
-            return [rml.ZERO] * (1 + len(sort.parameters))
-        case sym.Points(tuples=((_, parts),)):
-            return [rml.ONE, *chain(*parts)]
-        case sym.Table(points=((arguments, result),)):
-            return [*chain(*arguments), *result]
-        case sym.Points() | sym.Tracked() | sym.Table():
-            raise rml.NotRml("an initial value with more than one tuple")
-        case _:  # a value's numbers
-            return [*symbol]
