@@ -14,7 +14,6 @@ from typing import assert_never
 from avow.base.diagnostics import Span
 from avow.base.optional import complete
 from avow.base.suggestions import did_you_mean
-from avow.base.tuning.sizes import DECLARED_PARTS, NESTING, REFERENCES_AHEAD
 from avow.language import syntax
 from avow.language import terms as t
 from avow.language.check_history import Histories
@@ -26,7 +25,7 @@ from avow.language.operators import conditional
 from avow.language.printer import show_sort
 from avow.language.scope import Defined
 from avow.language.sorts import BOOL, BUILTINS, REAL, FunctionSort, SequenceSort, SetSort, Sort, TupleSort
-from avow.language.subterms import subterms, term_extent
+from avow.language.subterms import subterms
 from avow.language.syntax import Syntax, TermSyntax
 
 
@@ -248,11 +247,6 @@ class Checker(Histories):
         if entry.state == "open":
             reports.error("RCL212", f"the definition of `{name.text}` refers to itself", name.start, name.end)
             return None
-        if sum(other.state == "open" for other in self.scope.defined.values()) > REFERENCES_AHEAD:
-            message = f"`{name.text}` stands at the end of a row of {REFERENCES_AHEAD} definitions that refer to others"
-            reports.error("RCL110", message, name.start, name.end, hint="define a name by fewer others")
-            entry.state = "done"
-            return None
         entry.state, before = "open", len(reports.found)
         scope = replace(
             self.scope,
@@ -267,13 +261,6 @@ class Checker(Histories):
             note = (f"it is used in node `{self.scope.node}` here", self.span(use))
             reports.found[before:] = [replace(d, notes=(*d.notes, note)) for d in reports.found[before:]]
         if body is None:
-            return None
-        size, depth = term_extent(body)
-        if size > DECLARED_PARTS or depth > NESTING:
-            most = f"{size:,} parts" if size > DECLARED_PARTS else f"{depth} levels"
-            message = f"`{name.text}` has {most} once all the names in it are written out"
-            hint = f"{DECLARED_PARTS:,} parts and {NESTING} levels are the most"
-            reports.error("RCL110", message, name.start, name.end, hint=hint)
             return None
         text = reports.source.text[tree.start : tree.end]
         entry.found = Definition(name.text, entry.parameters, body, text, reports.source.span(name.start, name.end))

@@ -13,7 +13,6 @@ from typing import assert_never
 from avow.base.diagnostics import Span
 from avow.base.records import dataclass
 from avow.base.suggestions import did_you_mean
-from avow.base.tuning.sizes import DECLARED_PARTS, NESTING, REFERENCES_AHEAD
 from avow.language import sorts as s
 from avow.language import syntax
 from avow.language.checker import Checker
@@ -22,7 +21,7 @@ from avow.language.foreign import FOREIGN_TYPES
 from avow.language.lexer import Token
 from avow.language.scope import Defined, Environment, Scope
 from avow.language.source import Reports, Source
-from avow.language.subterms import sort_extent, subterms, term_extent
+from avow.language.subterms import subterms
 from avow.language.terms import EnumValue, Quantified, Role, SetTerm, Variable
 
 
@@ -52,8 +51,6 @@ class Declarations:
     """The type declaration that contains each element or constructor: known before anything is elaborated."""
     definitions: dict[str, Defined] = field(default_factory=dict)
     """The definitions of the contexts; each node re-checks those that mention its inputs and outputs."""
-    open: int = 0
-    """The number of declarations that wait for one that they refer to."""
 
     def add(self, trees: Sequence[syntax.Declaration], reports: Reports) -> None:
         for tree in trees:
@@ -97,22 +94,14 @@ class Declarations:
             return
         environment, name = self.environment, declared.name.text
         environment.places[name] = declared.place
-        if self.open > REFERENCES_AHEAD:
-            message = f"`{name}` stands at the end of a row of {REFERENCES_AHEAD} declarations that refer to later ones"
-            hint = "declare a name before the declarations that use it"
-            declared.reports.error("RCL110", message, declared.name.start, declared.name.end, hint=hint)
-            environment.broken.add(name)
-            declared.state = "done"
-            return
         declared.state = "open"
-        self.open += 1
         match declared.tree:
             case syntax.TypeDeclaration(type=type_):
                 sort = self.type_of(type_, declared.reports, name)
                 if sort is None:
                     environment.broken.add(name)
                     environment.broken.update(_names(type_))
-                elif self.is_small(name, sort_extent(sort), declared.name, declared.reports):
+                else:
                     environment.types[name] = sort
             case syntax.ConstantDeclaration(value=value):
                 self.constant(declared, syntax.unparenthesised(value))
@@ -120,22 +109,7 @@ class Declarations:
                 self.define(declared.tree, declared.reports, self.definitions, Scope(environment, bare=False))
             case _:
                 assert_never(declared.tree)
-        self.open -= 1
         declared.state = "done"
-
-    def is_small(self, name: str, extent: tuple[int, int], place: Token, reports: Reports) -> bool:
-        """Whether a sort or value is within the limits of size and depth; reports it if not."""
-        size, depth = extent
-        if size <= DECLARED_PARTS and depth <= NESTING:
-            return True
-        what = f"{size:,} parts" if size > DECLARED_PARTS else f"{depth} levels"
-        most = f"{DECLARED_PARTS:,}" if size > DECLARED_PARTS else str(NESTING)
-        if size >= 10**15:
-            what = "astronomically many parts"
-        message = f"`{name}` has {what} once all the names in it are written out; {most} is the most"
-        reports.error("RCL110", message, place.start, place.end)
-        self.environment.broken.add(name)
-        return False
 
     # --- definitions -------------------------------------------------------------------------------------------------
 
@@ -202,8 +176,6 @@ class Declarations:
             return
         term = Checker(Scope(environment), declared.reports).term(value)
         environment.broken.update(tree.text for tree in fresh)
-        if term is not None and not self.is_small(name, term_extent(term), declared.name, declared.reports):
-            return
         if term is not None and any(isinstance(part, Quantified) for part in subterms(term)):
             message = "a constant is a value: no quantifier stands in it"
             declared.reports.error("RCL220", message, value.start, value.end, hint="write the formula where it is used")

@@ -8,7 +8,7 @@ from __future__ import annotations
 import re
 from typing import NamedTuple
 
-from avow.base.tuning.sizes import DIGITS, TOKENS
+from avow.base.tuning.sizes import DIGITS
 from avow.language.foreign import SIGNS, foreign, invisible
 from avow.language.source import Reports
 
@@ -138,10 +138,6 @@ def tokens(reports: Reports, comments: list[Token] | None = None) -> list[Token]
             break
         else:
             at = other.read(kind, piece, start, at)
-    if len(found) > TOKENS:
-        last = found[TOKENS]
-        reports.error("RCL003", f"the text has more than {TOKENS:,} words and signs", last.start, last.end)
-        return []
     return found
 
 

@@ -179,10 +179,14 @@ def _checked(
             if len(_under) >= CONTRACTS_KEPT:
                 _under.clear()
             _under[tuple(source.text for source in sources)] = names
-        if shelf is not None and distinct and not partial:
-            found = by_pieces(sources, off, shelf)
-        if found is None:
-            found = _whole(sources, off, partial)
+        try:
+            if shelf is not None and distinct and not partial:
+                found = by_pieces(sources, off, shelf)
+            found = found or _whole(sources, off, partial)
+        except RecursionError:
+            message = "a name is declared by another, that by another and so on, too many times"
+            place = sources[0].span(0, 0)
+            found = NOTHING, (Diagnostic("RCL110", message, place, hint="declare a name before those that use it"),)
         if len(_lately) >= CONTRACTS_KEPT:
             _lately.clear()
         _lately[key] = found

@@ -18,7 +18,7 @@ from avow.language.printer import show_type
 from avow.language.scope import Defined, Scope
 from avow.language.sorts import BoolSort, EnumSort, IntegerSort, NaturalSort, RealSort, Sort, StringSort
 from avow.language.source import Reports
-from avow.language.subterms import histories, sort_extent, term_extent
+from avow.language.subterms import histories, term_extent
 from avow.language.syntax import ClauseSyntax, NodeSyntax, PortDeclaration, RosType, UnspecifiedType
 from avow.language.terms import Role, Term
 from avow.language.units import BASES, DERIVED, ONE_UNIT, clashes, unit
@@ -49,7 +49,7 @@ def check_ports(
                 reports.error("RCL214", message, name.start, name.end, notes=notes)
                 continue
             sort = declarations.type_of(part.type, reports, name.text)
-            if sort is None or not declarations.is_small(name.text, sort_extent(sort), name, reports):
+            if sort is None:
                 node.broken.add(name.text)
                 continue
             written = flat_text(reports.source.text[part.type.start : part.type.end])

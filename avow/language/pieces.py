@@ -16,7 +16,6 @@ from avow.base.diagnostics import Diagnostic
 from avow.base.records import dataclass
 from avow.base.remembered import Shelf, Stretch
 from avow.base.tuning.shown import DIAGNOSTICS
-from avow.base.tuning.sizes import TOKENS
 from avow.language.contract import Contract, Node
 from avow.language.declarations import Declarations
 from avow.language.lexer import Token, tokens
@@ -41,8 +40,6 @@ class _Piece:
     lints: tuple[Diagnostic, ...]
     spoken: frozenset[str]
     """The names that it mentions."""
-    words: int
-    """The number of its tokens."""
     parts: tuple[tuple[int, int], ...]
     allows: tuple[Token, ...]
     """Comments that allow a lint."""
@@ -60,7 +57,6 @@ class _Head:
     reports: Reports
     allows: tuple[Token, ...]
     first: int
-    words: int
 
 
 def by_pieces(
@@ -81,7 +77,9 @@ def _by_pieces(sources: Sequence[Source], off: frozenset[str], shelf: Shelf) -> 
     declarations.elaborate()
     _sound(heads)
     lines = {head.source.file: head.source.line + head.lines for head in heads}
-    texts = [text for head in heads for text in (head.source.file, head.reports.source.text) if head.words]
+    texts = [
+        text for head in heads for text in (head.source.file, head.reports.source.text) if head.syntax.declarations
+    ]
     environment = declarations.environment
     before = _size(declarations)
     digests, pieces = list[str](), list[list[_Piece]]()
@@ -141,9 +139,7 @@ def _head(source: Source) -> _Head:
         stretches.append((begin, Stretch(source.file, line, following), piece))
         line = following
     first = found[0].start if found else source.text.index("node", begins[0])
-    return _Head(
-        source, text.count("\n"), tuple(stretches), syntax, reports, tuple(filter(allows, comments)), first, len(found)
-    )
+    return _Head(source, text.count("\n"), tuple(stretches), syntax, reports, tuple(filter(allows, comments)), first)
 
 
 def _sound(heads: Sequence[_Head]) -> None:
@@ -174,7 +170,6 @@ def _piece(source: Source, declarations: Declarations) -> _Piece:
         node,
         tuple(of_node(file, tree, node)),
         spoken(tree),
-        len(found),
         tuple(syntax.parts),
         tuple(filter(allows, comments)),
     )
@@ -182,8 +177,6 @@ def _piece(source: Source, declarations: Declarations) -> _Piece:
 
 def _linted(head: _Head, pieces: Sequence[_Piece]) -> LintedFile:
     """The lints' input for a file whose nodes have already been checked."""
-    if head.words + sum(piece.words for piece in pieces) > TOKENS:
-        raise _Whole
     begun = list(zip((begin for begin, _, _ in head.stretches), pieces, strict=True))
     comments = (c._replace(start=at + c.start, end=at + c.end) for at, piece in begun for c in piece.allows)
     parts = ((at + start, at + end) for at, piece in begun for start, end in piece.parts)

@@ -1,12 +1,10 @@
-"""The subterms of a term, in reading order and at any depth; and the size of a term or sort."""
+"""The subterms of a term, in reading order and at any depth; and the size of a term."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from typing import TypeVar
+from collections.abc import Iterator
 
 from avow.base.remembered import by_identity
-from avow.language.sorts import Sort, parts
 from avow.language.terms import History, Past, Role, Term, Variable
 
 
@@ -46,35 +44,22 @@ def ports_of(term: Term) -> tuple[Variable, ...]:
 # --- how large it is --------------------------------------------------------------------------------------------------
 
 # Declarations share the values that they name (`A = B + B; B = C + C; …`), so a few lines can denote a term too large
-# for any later pass. A term that is too large or too deep once every name in it is expanded is therefore refused where
-# it is declared or used.
-
-_Part = TypeVar("_Part")
+# for any later pass. A clause that is too large or too deep once every name in it is expanded is therefore refused.
 
 
-def _extent(root: _Part, parts: Callable[[_Part], tuple[_Part, ...]]) -> tuple[int, int]:
-    """The number of parts, and their depth. Visits each shared part once, and never recurses."""
+def term_extent(term: Term) -> tuple[int, int]:
+    """A term's parts, and their depth. Visits each shared part once, and never recurses."""
     known: dict[int, tuple[int, int]] = {}
-    stack: list[tuple[_Part, bool]] = [(root, False)]
+    stack: list[tuple[Term, bool]] = [(term, False)]
     while stack:
         part, ready = stack.pop()
         if id(part) in known:
             continue
-        inner = parts(part)
+        inner = part.children
         if ready or not inner:
             found = [known[id(p)] for p in inner]
             known[id(part)] = (1 + sum(size for size, _ in found), 1 + max((depth for _, depth in found), default=0))
         else:
             stack.append((part, True))
             stack += [(p, False) for p in inner]
-    return known[id(root)]
-
-
-def term_extent(term: Term) -> tuple[int, int]:
-    """A term's parts and depth."""
-    return _extent(term, lambda part: part.children)
-
-
-def sort_extent(sort: Sort) -> tuple[int, int]:
-    """A sort's parts (an enumeration's elements do not count) and depth."""
-    return _extent(sort, parts)
+    return known[id(term)]

@@ -6,13 +6,11 @@ import pytest
 from helpers import calls
 
 from avow.base.diagnostics import Diagnostic
-from avow.base.tuning.sizes import REFERENCES_AHEAD
 from avow.formulas.formula import node_digest
 from avow.language.contract import Contract
 from avow.language.format import format_text
 from avow.language.load import check_text
-from avow.language.sorts import REAL, DataSort, SequenceSort, TupleSort
-from avow.language.subterms import sort_extent, term_extent
+from avow.language.subterms import term_extent
 from avow.language.translate import to_json, to_unicode
 
 NODE = "node n { inputs( i : %s ) outputs( o : BOOL ) topics() guarantee( %s ) }"
@@ -35,21 +33,13 @@ def row(count: int, first: str, form: str, last: str = "") -> str:
 @pytest.mark.parametrize(
     ("context", "sort", "formula"),
     [
-        (row(40, "C0 = 1;", "C{0} = C{1} + C{1};"), "REAL", "o or C39 > 1"),
-        (row(40, "C0 = {1, 2};", "C{0} = (C{1}, C{1});"), "REAL", "o"),
-        (row(40, "T0 : {a};", "T{0} : (T{1}, T{1});"), "T39", "o"),
-        (row(40, "T0 : {a};", "T{0} : {{c{0}(T{1}, T{1})}};"), "T39", "o"),
-        (row(40, "T0 : {a};", "T{0} : T{1} x T{1} --> T{1};"), "T39", "o"),
-        (row(400, "T0 : {a};", "T{0} : <T{1}>;"), "T399", "o"),
         (row(400, "C0 = 1;", "C{0} = -(C{1});"), "REAL", "o or C399 > 1"),
         (row(4000, "", "C{1} = C{0} + 1;", "C3999 = 1;"), "REAL", "o or C0 > 1"),
         (row(4000, "", "T{1} : T{0};", "T3999 : REAL;"), "T0", "o"),
     ],
 )
 def test_what_is_too_large_is_refused(context: str, sort: str, formula: str) -> None:
-    found = codes(context + NODE % (sort, formula))
-    assert "RCL110" in found
-    assert set(found) <= {"RCL110", "RCL302", "RCL307"}
+    assert codes(context + NODE % (sort, formula)) == ["RCL110"]
 
 
 def test_constants_in_formulas_count() -> None:
@@ -65,7 +55,7 @@ def test_constants_in_formulas_count() -> None:
 
 
 def test_declarations_in_a_moderate_row_are_accepted_whatever_their_order() -> None:
-    count = REFERENCES_AHEAD // 2
+    count = 50
     assert codes(row(count, "", "T{1} : T{0};", f"T{count - 1} : REAL;") + NODE % ("T0", "o and i > 0")) == []
     assert codes(row(2000, "T0 : REAL;", "T{0} : T{1};") + NODE % ("T1999", "o and i > 0")) == []
 
@@ -102,11 +92,7 @@ def test_what_is_as_deep_as_may_be_breaks_nothing(formula: str) -> None:
     assert hash(contract.nodes[0].guarantees[0].formula)
 
 
-def test_extents() -> None:
-    pair = TupleSort((REAL, SequenceSort(REAL)))
-    assert sort_extent(pair) == (4, 3)
-    assert sort_extent(TupleSort((pair, pair))) == (9, 4)
-    assert sort_extent(DataSort("d", ())) == (1, 1)
+def test_extent() -> None:
     contract = check_text(NODE % ("REAL", "i > 1 and o"), "f")[0]
     assert contract is not None
     assert term_extent(contract.nodes[0].guarantees[0].formula) == (5, 3)

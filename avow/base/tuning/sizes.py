@@ -26,21 +26,11 @@ REWRITTEN_DEPTH = 200
 SENTENCE = 4_000
 """So many characters of a sentence are read: the lints of sentences look at each word."""
 
-TOKENS = 1_000_000
-"""A text with more is no contract; a megabyte of RCL has some 250,000."""
-
 DIGITS = 500
 """Longer numbers are rejected: nobody means them, and arithmetic on them costs more than it is worth."""
 
-DECLARED_PARTS = 20_000
-"""So many parts a constant or a type may have, written out: one that doubles another that doubles another soon
-fills the memory."""
-
 CLAUSE_PARTS = 200_000
 """So many parts a clause may have, constants written out."""
-
-REFERENCES_AHEAD = 100
-"""Longest chain of declarations before what they refer to, because following it recurses."""
 
 CONTRACT_BYTES = 4_000_000
 """A larger file is no contract: at forty bytes a line it has a hundred thousand lines."""
