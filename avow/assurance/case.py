@@ -230,7 +230,7 @@ def conclude(facts: Facts) -> Case:
         baseline=facts.baseline,
         sources=facts.sources,
         earlier=facts.earlier,
-        history=facts.history,
+        left_out=facts.left_out,
     )
     return replace(case, answers=with_signature(case))
 

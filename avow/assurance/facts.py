@@ -14,7 +14,7 @@ from types import MappingProxyType
 
 from avow.assurance.answers import EARLIER, Baseline
 from avow.assurance.certification import KernelRun
-from avow.assurance.history import History, history
+from avow.assurance.history import kept_records
 from avow.assurance.model import (
     Case,
     Derivation,
@@ -66,7 +66,7 @@ class Facts:
     baseline: Baseline | None = None
     kernel: KernelRun = field(default_factory=KernelRun)
     earlier: bool = False
-    history: History = field(default_factory=History)
+    left_out: int = 0
     hazards: tuple[Hazard, ...] = ()
 
 
@@ -112,7 +112,8 @@ def facts_of_system(
         for node in system.contract.nodes
         if not node.relay
     )
-    kept, told = history(records if recorded is None else recorded, obligations, keys)
+    held = records if recorded is None else recorded
+    kept = kept_records(held, obligations, keys)
     return Facts(
         system=plan.system,
         title=plan.title,
@@ -151,7 +152,7 @@ def facts_of_system(
         statements=tuple(replace(s, span=_relative(s.span, plan)) for s in plan.statements),
         baseline=baseline,
         kernel=kernel or KernelRun(),
-        history=told,
+        left_out=sum(e.hash not in kept for e in held),
         hazards=tuple(replace(h, span=_relative(h.span, plan)) for h in plan.hazards),
     )
 
@@ -221,7 +222,7 @@ def facts_of_case(case: Case) -> Facts:
         baseline=case.baseline,
         kernel=case.kernel,
         earlier=case.earlier,
-        history=case.history,
+        left_out=case.left_out,
         hazards=tuple(view.hazard for view in case.hazards),
     )
 

@@ -16,7 +16,6 @@ from enum import StrEnum
 from avow.assurance.answers import Answers, Assumption, Baseline, Changes, Deficit, Level, Tone, WeakestEvidence
 from avow.assurance.certification import Grade, KernelRun, ProofView, Trusted
 from avow.assurance.hazards import HazardView
-from avow.assurance.history import History
 from avow.assurance.naming import is_advice
 from avow.assurance.policy import Policy
 from avow.assurance.rates import RateView
@@ -437,7 +436,8 @@ class Case:
     """Whether the plan lists the expected findings (strictly: all of these and no others)."""
     orphans: tuple[Entry, ...] = ()
     """Evidence for claims that no longer exist."""
-    history: History = field(default_factory=History, metadata=codec.LATER)
+    left_out: int = field(default=0, metadata=codec.LATER)
+    """Records of earlier states that only the ledger has."""
     hazards: tuple[HazardView, ...] = field(default=(), metadata=codec.LATER)
     standard: StandardView | None = field(default=None, metadata=codec.LATER)
     """The objectives of the standard that the policy names."""

@@ -86,7 +86,7 @@ def open_items(
         OpenItem(
             "advice",
             view.id,
-            _summary(view),
+            decisive(view),
             advice=True,
             handled=view.handled,
             title=view.obligation.claim,
@@ -182,7 +182,7 @@ def _open(view: ObligationView, said: Mapping[str, str]) -> OpenItem:
     return OpenItem(
         view.status.value,
         view.id,
-        _summary(view),
+        decisive(view),
         suggestion,
         view.handled,
         title=view.obligation.claim,
@@ -190,7 +190,7 @@ def _open(view: ObligationView, said: Mapping[str, str]) -> OpenItem:
     )
 
 
-def _summary(view: ObligationView) -> str:
+def decisive(view: ObligationView) -> str:
     """The decisive evidence in a line: a refutation's counterexample, else the last attempt's summary."""
     if view.obligation.unwritten:
         return "nothing: it is a draft's placeholder"

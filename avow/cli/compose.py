@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import shutil
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from pathlib import Path
 
 import click
@@ -16,7 +13,7 @@ from rich.text import Text
 
 from avow.base.codec import document
 from avow.base.diagnostics import Diagnostic, Rejected, refuse
-from avow.base.rendering import render
+from avow.base.rendering import printable, render
 from avow.base.verdict import Counterexample, HypothesisKind, Outcome, Verdict
 from avow.calculus.composition import Composition, compose
 from avow.calculus.derivation import Goal
@@ -31,42 +28,10 @@ from avow.language.translate import to_rcl
 from avow.solving.limits import from_seconds
 
 
-@dataclass(slots=True)
-class Progress:
-    """The answers so far, by the names of the claims, on one line of stderr; nothing is written if it is not a
-    terminal."""
-
-    total: int
-    answers: dict[str, str] = field(default_factory=dict)
-
-    def tell(self, name: str, answer: str) -> None:
-        self.answers[name] = answer
-        self._line(f"… {len(self.answers)} of {self.total}: {name} {answer}")
-
-    def _line(self, text: str) -> None:
-        if sys.stderr.isatty():
-            width = shutil.get_terminal_size().columns - 1
-            printable = "".join(c if c.isprintable() else "?" for c in text)
-            sys.stderr.write(f"\r{printable[:width].ljust(width)}\r")
-            sys.stderr.flush()
-
-    def end(self) -> None:
-        self._line("")
-
-
-@contextmanager
-def progress(total: int) -> Iterator[Progress]:
-    """On an interrupt, the answers so far are listed on stderr, with a note that none is final."""
-    telling = Progress(total)
-    try:
-        yield telling
-    except KeyboardInterrupt:
-        telling.end()
-        for name, answer in telling.answers.items():
-            print(f"{answer:9} {name}", file=sys.stderr)
-        print(f"{len(telling.answers)} of {total}, as far as the search came: none is final", file=sys.stderr)
-        raise
-    telling.end()
+def _tell(name: str, answer: object) -> None:
+    """An answer as soon as it is there, on a terminal's stderr: an interrupt leaves those so far, and none is final."""
+    if sys.stderr.isatty():
+        click.echo(printable(f"… {name} {answer}"), err=True)
 
 
 @click.command()
@@ -94,13 +59,11 @@ def command(path: Path, goals: tuple[str, ...], as_json: bool, as_rcl: bool, sec
         raise Rejected(Diagnostic("CLI005", f"there is no derivation '{unknown[0]}'", hint=hint))
 
     bounds = Bounds(from_seconds(seconds), seed)
+    composition.told = lambda goal, found: _tell(f"{goal}.{found.condition.about}", found.verdict)
     chosen = [goal for goal in composition.goals if not goals or goal.name in goals]
     if as_rcl:
         goal = chosen[-1] if goals else composition.whole
-        parts = list(goal.inner_first())
-        with progress(sum(len(part.conditions) for part in parts)) as telling:
-            composition.told = lambda goal, found: telling.tell(f"{goal}.{found.condition.about}", str(found.verdict))
-            standing = composition.stands(goal, bounds)
+        standing = composition.stands(goal, bounds)
         if standing is not Verdict.PROVED:
             click.echo(f"{goal.name} is {standing}: no contract follows from it (see `avow compose {path}`)", err=True)
             return 1
@@ -113,13 +76,10 @@ def command(path: Path, goals: tuple[str, ...], as_json: bool, as_rcl: bool, sec
     wanted = (*prefixes, "environment.")  # what an assumption that cannot hold supports is vacuous
     obligations = [o for o in every if not goals or (o.kind is Kind.COMPOSITION and o.name.startswith(wanted))]
 
-    asked = {o.name for o in obligations} | {f"{goal.name}.{c.about}" for goal in chosen for c in goal.conditions}
-    with progress(len(asked)) as telling:
-        composition.told = lambda goal, found: telling.tell(f"{goal}.{found.condition.about}", str(found.verdict))
-        settled = []
-        for obligation, outcome in zip(obligations, settle_each(composition, obligations, bounds), strict=True):
-            telling.tell(obligation.name, str(outcome.verdict))
-            settled.append(outcome)
+    settled = []
+    for obligation, outcome in zip(obligations, settle_each(composition, obligations, bounds), strict=True):
+        _tell(obligation.name, outcome.verdict)
+        settled.append(outcome)
     outcomes = _without_what_is_hollow(obligations, settled)
     if as_json:
         click.echo(document(to_document(composition, chosen, obligations, outcomes)))

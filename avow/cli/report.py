@@ -78,7 +78,7 @@ def _check(folder: Path, as_json: bool) -> int:
             click.echo(f"  ✘ {line}")
     else:
         records = sum(len(view.evidence) for view in case.obligations)
-        left_out = f" ({case.history.left_out} older ones in the ledger alone)" if case.history.left_out else ""
+        left_out = f" ({case.left_out} older ones in the ledger alone)" if case.left_out else ""
         told = f"{records} records{left_out}, {len(case.obligations)} obligations, proofs {case.grade.word}"
         told += f"; {case.answers.warned}" if case.answers.warned else ""
         click.echo(f"{folder}: agrees with the ledger: {told}{', of an earlier state' if old else ''}")

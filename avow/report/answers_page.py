@@ -191,7 +191,7 @@ def render_index(cases: Sequence[Case], earlier: Sequence[str] = ()) -> str:
         tone = Tone.AMBER if tone is Tone.GREEN else tone
     return fill(
         "systems.html.j2",
-        rows=[(case, case.history.points) for case in ranked],
+        rows=ranked,
         earlier=earlier,
         titles=Counter(case.title for case in cases),
         line=line,

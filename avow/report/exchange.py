@@ -11,6 +11,7 @@ from avow.assurance.answers import EARLIER, Level
 from avow.assurance.codec import to_json
 from avow.assurance.model import Case, Gate, ObligationView, RequirementView
 from avow.assurance.naming import sanity_property, short
+from avow.assurance.summary import decisive
 from avow.base.files import sha256
 from avow.base.records import dataclass
 from avow.base.rendering import sarif_place
@@ -18,24 +19,12 @@ from avow.evidence.obligation import Kind
 from avow.evidence.status import Status
 from avow.report.layout import json_text
 from avow.report.page import fill
-from avow.report.wording import MEANINGS, banner_tone, of_nodes, tone
+from avow.report.wording import banner_tone, of_nodes, tone
 
 
 def render_json(case: Case) -> str:
     """The whole case (schema: docs/schemas/case.schema.json)."""
     return json_text(to_json(case))
-
-
-def headline(view: ObligationView) -> str:
-    """An obligation's state in a line: its refutation if there is one, else the newest evidence, else the status."""
-    counting = view.records
-    for record in counting:
-        if record.verdict.value == "refuted":
-            example = record.counterexample.text() if record.counterexample else ""
-            return f"{record.method}: {example or record.summary}"
-    if counting:
-        return f"{counting[-1].method}: {counting[-1].summary}"
-    return MEANINGS[view.status]
 
 
 def _result_of(case: Case) -> str:
@@ -97,7 +86,7 @@ def _of_requirement(requirement: RequirementView, case: Case) -> _Row:
 
 
 def _of_claim(view: ObligationView, case: Case) -> _Row:
-    o, message = view.obligation, f"{view.word}: {headline(view)}"
+    o, message = view.obligation, f"{view.word}: {decisive(view)}"
     row = _Row(f"{o.node}.{o.kind}", o.name, "", seconds=sum(r.seconds for r in view.records))
     if _fails(view) and not view.advice:
         return replace(row, outcome="failure", message=message, type=view.status.value)
@@ -170,7 +159,7 @@ def _result(view: ObligationView, case: Case, rules: list[str]) -> dict[str, Any
         "ruleIndex": rules.index(_rule(view)),
         "kind": kind,
         "level": level,
-        "message": {"text": f"{short(o.id)} is {view.word}. {o.claim.rstrip('.')}. {headline(view)}"},
+        "message": {"text": f"{short(o.id)} is {view.word}. {o.claim.rstrip('.')}. {decisive(view)}"},
         "partialFingerprints": {"avowObligation/v1": sha256(o.id)},
         "properties": {
             "obligation": o.id,

@@ -5,15 +5,18 @@ from __future__ import annotations
 import functools
 import re
 import shlex
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 from urllib.parse import quote
+
+import yaml
 
 from avow.assurance import naming
 from avow.assurance.answers import Deficit, Level, Tone
 from avow.assurance.hazards import WORST_FIRST
 from avow.assurance.model import Case, EvidenceView, ObligationView, RequirementView
 from avow.assurance.naming import cut
+from avow.base.codec import plain
 from avow.base.files import sha256
 from avow.base.plain import count, listed
 from avow.base.tuning.shown import DETAILS, FORMULA_COLUMNS, HAZARD_CHARACTERS
@@ -308,25 +311,9 @@ def details_text(evidence: Evidence) -> str:
     rest = {
         key: value for key, value in evidence.details.items() if key not in shown and value not in ("", [], {}, None)
     }
-    text = "\n".join(_indented(rest, ""))
+    fast = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
+    text = yaml.dump(plain(rest), Dumper=fast, sort_keys=False, allow_unicode=True).strip() if rest else ""
     return text if len(text) <= DETAILS else text[:DETAILS] + "\n… (all of it is in report.json)"
-
-
-def _indented(value: object, margin: str) -> Iterator[str]:
-    if isinstance(value, dict):
-        for key, item in value.items():
-            if isinstance(item, dict | list):
-                yield f"{margin}{key}:"
-                yield from _indented(item, margin + "  ")
-            else:
-                yield f"{margin}{key}: {_plain(item)}"
-    elif isinstance(value, list):
-        for item in value:
-            if isinstance(item, dict | list):
-                inner = list(_indented(item, margin + "  "))
-                yield from [f"{margin}- {inner[0].lstrip()}", *inner[1:]] if inner else []
-            else:
-                yield f"{margin}- {_plain(item)}"
 
 
 def history(view: ObligationView) -> tuple[EvidenceView, ...]:

@@ -11,7 +11,7 @@ import pytest
 from avow.assurance.case import conclude, conclude_again
 from avow.assurance.codec import from_json, to_json
 from avow.assurance.facts import facts_of_case, facts_of_system
-from avow.assurance.history import history
+from avow.assurance.history import kept_records
 from avow.assurance.model import Case
 from avow.base.tuning.shown import OLDER_RECORDS
 from avow.base.verdict import Verdict
@@ -50,7 +50,7 @@ def of(records: list[Evidence]) -> Case:
 
 def told(found: Case) -> object:
     """Everything but the records."""
-    plain = to_json(replace(found, orphans=(), history=type(found.history)()))
+    plain = to_json(replace(found, orphans=(), left_out=0))
     for view in plain["obligations"]:
         view["evidence"] = [item for item in view["evidence"] if item["counts"]]
     return plain
@@ -68,8 +68,7 @@ def test_what_is_left_out_changes_no_conclusion(seed: int) -> None:
 @pytest.mark.parametrize("seed", range(25))
 def test_what_can_count_every_refutation_and_the_newest_are_kept(seed: int) -> None:
     entries = chain(random_records(random.Random(seed)))
-    kept, found = history(entries, [G, H], KEYS)
-    assert found.left_out == len(entries) - len(kept)
+    kept = kept_records(entries, [G, H], KEYS)
     assert entries[-1].hash in kept
     for entry in (e for e in entries if e.hash not in kept):
         record = entry.evidence
@@ -90,7 +89,7 @@ def test_a_report_does_not_grow_with_runs_that_ask_the_same_again(verdict: Verdi
 
     few, many = after(3), after(40)
     assert len(few.obligations[0].evidence) == len(many.obligations[0].evidence) == OLDER_RECORDS
-    assert many.history.left_out == 40 - OLDER_RECORDS
+    assert many.left_out == 40 - OLDER_RECORDS
     assert many.obligations[0].evidence[-1].entry.evidence.run == "39"
 
 
@@ -101,13 +100,13 @@ def test_a_report_does_not_grow_with_runs_that_ask_the_same_again(verdict: Verdi
 def test_of_records_that_may_not_count_together_none_is_left_out_for_another(apart: dict[str, object]) -> None:
     records = [evidence(G, key="now", run=str(run)) for run in range(4)]
     others = [replace(r, details=apart, run="x" + r.run) for r in records]
-    kept, _ = history(chain([*others, *records]), [G, H], KEYS)
+    kept = kept_records(chain([*others, *records]), [G, H], KEYS)
     assert len(kept) == 2 * OLDER_RECORDS
 
 
 def test_refutations_by_other_examples_are_all_kept() -> None:
     records = [evidence(G, Verdict.REFUTED, key="now", details={CASE: [k]}) for k in range(9)]
-    assert len(history(chain(records), [G, H], KEYS)[0]) == 9
+    assert len(kept_records(chain(records), [G, H], KEYS)) == 9
 
 
 def test_a_report_grows_with_the_claims_and_not_with_the_edits() -> None:
@@ -116,8 +115,7 @@ def test_a_report_grows_with_the_claims_and_not_with_the_edits() -> None:
 
     few, many = after(5), after(50)
     assert len(few.obligations[0].evidence) == len(many.obligations[0].evidence) == 1 + OLDER_RECORDS
-    assert many.history.left_out == 50 - OLDER_RECORDS
-    assert len(many.history.points) > len(few.history.points), "the trend is of the whole ledger"
+    assert many.left_out == 50 - OLDER_RECORDS
 
 
 def compared(found: Case, place: Path, records: list[Evidence]) -> list[str]:
@@ -129,9 +127,8 @@ def compared(found: Case, place: Path, records: list[Evidence]) -> list[str]:
 
 def without(found: Case, entry: Entry) -> Case:
     views = (replace(v, evidence=tuple(i for i in v.evidence if i.entry != entry)) for v in found.obligations)
-    left_out = replace(found.history, left_out=found.history.left_out + 1)
     orphans = tuple(e for e in found.orphans if e != entry)
-    return replace(found, obligations=tuple(views), orphans=orphans, history=left_out)
+    return replace(found, obligations=tuple(views), orphans=orphans, left_out=found.left_out + 1)
 
 
 @pytest.mark.parametrize("seed", range(8))
@@ -144,22 +141,19 @@ def test_no_record_that_is_kept_may_be_missing_though_it_is_counted_as_left_out(
         assert any("does not show" in line for line in missing)
 
 
-def test_the_count_and_the_runs_are_those_of_the_ledger(tmp_path: Path) -> None:
+def test_the_count_is_that_of_the_ledger(tmp_path: Path) -> None:
     records = [evidence(G, key=str(k), run=str(k)) for k in range(6)]
     found = of(records)
     assert compared(found, tmp_path, records) == []
     ledger = Ledger(tmp_path / "made.jsonl")
-    fewer = replace(found, history=replace(found.history, left_out=0))
+    fewer = replace(found, left_out=0)
     assert any("leaves out 0 records" in line for line in _ledger(fewer, ledger, tmp_path))
-    better = replace(found.history.points[0], supported=2, open=0)
-    runs = replace(found, history=replace(found.history, points=(better, *found.history.points[1:])))
-    assert any("after each run" in line for line in _ledger(runs, ledger, tmp_path))
 
 
 def test_what_counts_no_more_since_a_file_changed_is_kept() -> None:
     """The file may be put back, and then it counts: the ledger alone decides what is kept."""
     entries = chain([evidence(G, key="now", details={OBSERVED: str(k)}) for k in range(6)])
     as_of_now = [changed_since(entry) for entry in entries]
-    assert len(history(entries, [G, H], KEYS)[0]) == 6
+    assert len(kept_records(entries, [G, H], KEYS)) == 6
     found = conclude(facts_of_system(subject(), [G, H], as_of_now, keys=KEYS, today=TODAY, run=RUN, recorded=entries))
     assert len(found.obligations[0].evidence) == 6

@@ -16,11 +16,8 @@ from avow import api
 from avow.api import load, settle
 from avow.base.diagnostics import Rejected
 from avow.base.process import run
-from avow.calculus import discharge as discharging
-from avow.calculus.derivation import Settled, SideCondition
-from avow.cli import main
+from avow.cli.compose import _tell
 from avow.cli.compose import command as compose_command
-from avow.cli.compose import progress
 from avow.cli.graph import command as graph_command
 from avow.cli.refines import command as refines_command
 from avow.cli.simulate import command as simulate_command
@@ -69,39 +66,15 @@ def test_nothing_is_proved_from_an_environment_that_cannot_be(tmp_path: Path, go
     assert "proved   " not in out
 
 
-def test_compose_tells_a_terminal_how_far_it_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_compose_tells_a_terminal_each_answer(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     make(tmp_path, GOOD)
     for terminal, told in ((Terminal(), True), (io.StringIO(), False)):
         with monkeypatch.context() as patched:
             patched.setattr(sys, "stderr", terminal)
-            with progress(2) as telling:
-                telling.tell("whole.b.A1\x1b[2J", "proved")
-        assert ("… 1 of 2: whole.b.A1?[2J proved" in terminal.getvalue()) == told
+            _tell("whole.b.A1\x1b[2J", "proved")
+        assert ("… whole.b.A1�[2J proved" in terminal.getvalue()) == told
         assert "\x1b" not in terminal.getvalue()
     assert "…" not in invoke(compose_command, str(tmp_path))[1]
-
-
-def test_compose_that_is_interrupted_tells_what_it_has(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    text = GOOD + node("c", "y : REAL", "z : REAL", "A: in.y < 2", "G: out.z == 0")
-    make(tmp_path, text)
-    asked = discharging._Solver.condition
-
-    def condition(self: discharging._Solver, side: SideCondition) -> Settled:
-        if side.consumer == "c":
-            raise KeyboardInterrupt
-        return asked(self, side)
-
-    monkeypatch.setattr(discharging._Solver, "condition", condition)
-    with pytest.raises(SystemExit) as ended:
-        main(["compose", str(tmp_path)])
-    shown = capsys.readouterr()
-    assert ended.value.code == 130
-    assert shown.out == ""
-    assert "proved    whole.b.A1" in shown.err
-    assert "1 of " in shown.err
-    assert "none is final" in shown.err
 
 
 def test_compose_json(tmp_path: Path) -> None:

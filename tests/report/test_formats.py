@@ -374,24 +374,6 @@ def test_the_index_does_not_call_known_bad_material_passed() -> None:
     assert "1 system, shown of models" in render_index([better])
 
 
-# -- trend ----------------------------------------------------------------------------------------------------------
-
-
-def test_the_trend_is_what_the_ledger_said_after_each_run() -> None:
-    g, h = guarantee("n", "g"), guarantee("n", "h")
-    subject = system({"n": ["g", "h"]}, plans=[node_plan("n", "low", "hoare")])
-    records = [
-        evidence(g, Verdict.UNKNOWN, key="1", run="a"),
-        evidence(g, Verdict.REFUTED, key="2", run="b"),
-        evidence(h, run="b"),
-        evidence(g, key="3", run="c"),
-    ]
-    found = case(subject, [g, h], records, keys={(g.id, "hoare"): "3", (h.id, "hoare"): records[2].key})
-    points = found.history.points
-    assert [(p.run, p.supported, p.refuted, p.open) for p in points] == [("a", 0, 0, 2), ("b", 1, 1, 0), ("c", 2, 0, 0)]
-    assert Status.PROVED.supports
-
-
 def test_every_format_is_described() -> None:
     names = [re.sub(r"^node-\w+", "node-NAME", name) for name, _ in every_text(rover_case())]
     names.append("report.pdf")

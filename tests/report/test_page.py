@@ -163,7 +163,7 @@ def test_details_are_told_readably() -> None:
     record = evidence(
         "n.g", details={"reviewer": "A", "checklist": [{"question": "q?", "answer": True}], "retry": True}
     )
-    assert wording.details_text(record) == "reviewer: A\nchecklist:\n  - question: q?\n    answer: yes"
+    assert wording.details_text(record) == "reviewer: A\nchecklist:\n- question: q?\n  answer: true"
     triple = evidence("n.g", details={"triples": [{"pre": "p", "post": "q", "verdict": "proved"}]})
     assert wording.outline(triple) == "{ p }  …  { q }   proved"
     assert wording.details_text(triple) == ""

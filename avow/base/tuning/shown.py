@@ -4,9 +4,6 @@ has those, too."""
 TOOL_WORDS = 160
 """Characters of a tool's own words in a suggestion: two lines."""
 
-TREND_RUNS = 24
-"""Runs shown, the newest: so many columns fit beside each other."""
-
 HAZARD_CHARACTERS = 120
 """Characters of a hazard's text on the first screen: about a line, so that a qualification at its end is not lost."""
 
