@@ -7,16 +7,14 @@ import json
 import os
 import random
 import shutil
-import subprocess
-import sys
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from helpers import avow
 
-AVOW = str(Path(sys.executable).with_name("avow"))
 TIMES = int(os.environ.get("AVOW_EDITS", "12"))
-FEW = 2
+FEW = 1
 """So many of them are not left for the night."""
 RCL = """node n { inputs( x : REAL ) outputs( y : REAL ) topics() guarantee small ( out.y <= 10 )
   guarantee large ( out.y >= -10 ) }
@@ -81,22 +79,16 @@ EDITS: dict[str, Callable[[Path], object]] = {
 }
 
 
-def avow(root: Path, *words: str) -> int:
-    done = subprocess.run([AVOW, *words], cwd=root, capture_output=True, text=True, timeout=120, check=False)
-    assert "Traceback" not in done.stdout + done.stderr, done.stdout + done.stderr
-    return done.returncode
-
-
 def said(root: Path, *options: str) -> tuple[int, dict[str, str]]:
-    code = avow(root, "verify", *options)
+    code = avow("verify", *options, cwd=root).returncode
     case = json.loads((root / "reports" / "s" / "report.json").read_text())
     statuses = {f"{o['obligation']['node']}/{o['obligation']['name']}": o["status"] for o in case["obligations"]}
     return code, statuses | {f"gate {gate['id']}": str(gate["passed"]) for gate in case["gates"]}
 
 
 @pytest.fixture(scope="module")
-def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Run twice, with a refutation that was there and one that still is."""
+def whole(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, tuple[int, dict[str, str]]]:
+    """Run twice, with a refutation that was there and one that still is; and what its runs say."""
     root = tmp_path_factory.mktemp("whole") / "w"
     folder = root / "contracts" / "s"
     folder.mkdir(parents=True)
@@ -104,8 +96,8 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
     for name, text in (("s.rcl", RCL), ("plan.yaml", PLAN), ("m.yaml", REVIEW)):
         (folder / name).write_text(text)
     (folder / "n.py").write_text("def step(x):\n    return x\n")
-    avow(root, "review", "stamp", "contracts/s", "m")
-    avow(root, "verify")
+    avow("review", "stamp", "contracts/s", "m", cwd=root)
+    avow("verify", cwd=root)
     (folder / "n.py").write_text("def step(x):\n    return min(x, 10)\n")
     code, found = said(root)
     assert code == 1
@@ -113,7 +105,7 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
     assert found["n/large"] == "refuted"
     assert found["gate integrity"] == "True"
     assert said(root) == said(root, "--fresh") == (code, found)
-    return root
+    return root, (code, found)
 
 
 def every(root: Path) -> list[tuple[str, str]]:
@@ -144,14 +136,17 @@ def fault(root: Path, before: tuple[int, dict[str, str]], name: str, edit: str) 
 @pytest.mark.parametrize(
     "at", [pytest.param(k, marks=pytest.mark.slow if k < FEW else pytest.mark.nightly) for k in range(TIMES)]
 )
-def test_every_edit_changes_nothing_or_is_told(whole: Path, tmp_path: Path, at: int) -> None:
-    edits = every(whole)
+def test_every_edit_changes_nothing_or_is_told(
+    whole: tuple[Path, tuple[int, dict[str, str]]], tmp_path: Path, at: int
+) -> None:
+    original, before = whole
+    edits = every(original)
     if at >= len(edits):
         pytest.skip("there are no more")
     name, edit = edits[at]
     root = tmp_path / "w"
-    shutil.copytree(whole, root, symlinks=True)
+    shutil.copytree(original, root, symlinks=True)
     EDITS[edit](root / name)
-    if (root / name).is_file() and (root / name).read_bytes() == (whole / name).read_bytes():
+    if (root / name).is_file() and (root / name).read_bytes() == (original / name).read_bytes():
         return
-    assert not fault(root, said(whole), name, edit), (name, edit)
+    assert not fault(root, before, name, edit), (name, edit)

@@ -105,7 +105,7 @@ def statements(draw: st.DrawFn) -> list[Statement]:
     return [*found, Statement("requirements.R.validation", "It amounts to it", "", *OWNED)]
 
 
-LAW = settings(max_examples=120, deadline=None)
+LAW = settings(max_examples=40, deadline=None)
 
 
 @pytest.mark.slow

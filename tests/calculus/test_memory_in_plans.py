@@ -137,17 +137,14 @@ STOPPER = """node stopper {
 """
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("formula", "verdict"),
-    some(
-        [
-            ("held[2 s](lidar.silent) -> within[1 s](stopper.stopped)", Verdict.PROVED),
-            ("held[2 s](lidar.silent) -> within[1.5 s](stopper.stopped)", Verdict.PROVED),
-            ("held[2 s](lidar.silent) -> within[0.5 s](stopper.stopped)", Verdict.REFUTED),
-        ],
-        0,
-        slow=1,
-    ),
+    [
+        ("held[2 s](lidar.silent) -> within[1 s](stopper.stopped)", Verdict.PROVED),
+        ("held[2 s](lidar.silent) -> within[1.5 s](stopper.stopped)", Verdict.PROVED),
+        ("held[2 s](lidar.silent) -> within[0.5 s](stopper.stopped)", Verdict.REFUTED),
+    ],
 )
 def test_a_requirement_in_seconds(tmp_path: Path, formula: str, verdict: Verdict) -> None:
     found = required(tmp_path, LIDAR + STOPPER, formula)
