@@ -16,6 +16,5 @@ Apart from it and from `drawn`, on purpose, stand
   sequences within a scenario's domains, so with formulas of its own), `temporal.test_systems` and `test_timed_systems`
   (two nodes whose clauses have memory), `adversarial.drawn` (all that a system may have, and edits of it);
 - an oracle whose subject is no typed term: FRET's intervals in `fretish.test_meaning`;
-- generators of terms that no text of a contract would be: those of `evaluate.test_against_z3` and
-  `logic.test_one_point`.
+- a generator of terms that no text of a contract would be: that of `logic.test_one_point`.
 """
