@@ -4,7 +4,11 @@ from __future__ import annotations
 
 import pytest
 
-LONG = ("test_one_obligation_at_a_time", "test_what_it_says_not_to_look_at", "test_hostile_names[wrong]")
+LONG = (
+    "test_one_obligation_at_a_time",
+    "test_what_it_says_not_to_look_at",
+    *(f"{name}[wrong]" for name in ("test_hostile_names", "test_a_hostile_folder", "test_files_that_are_missing")),
+)
 
 
 @pytest.hookimpl(tryfirst=True)

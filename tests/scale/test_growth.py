@@ -6,12 +6,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from calculus.make import discharge
 from helpers import calls
 
-from avow.backend_kit.protocol import Limits
-from avow.base.verdict import Verdict
-from avow.calculus.obligations import composition_obligations
 from avow.calculus.variables import closest, indexed
 from avow.formulas.formula import free_variables
 from avow.language.sorts import INTEGER
@@ -20,31 +16,13 @@ from avow.pipeline.work import catalogue
 from avow.system.load import load_path
 from avow.system.plan import System
 
-from .made import chain, fan, seconds
+from .made import chain, fan
 
 
 def made(folder: Path, text: str) -> System:
     path = folder / "system.rcl"
     path.write_text(text)
     return load_path(path)
-
-
-def compose(system: System) -> None:
-    found = discharge(system, composition_obligations(system), Limits(seconds=20))
-    open_ = [o.obligation for o in found if o.verdict is not Verdict.PROVED]
-    assert all(name.endswith(("one-output", "environment.root.a0")) for name in open_), open_
-
-
-@pytest.mark.nightly
-@pytest.mark.parametrize("shape", [chain, fan])
-@pytest.mark.parametrize(("work", "few"), [(catalogue, 50), (compose, 30)], ids=["catalogue", "compose"])
-def test_four_times_the_nodes_cost_at_most_five_times(
-    tmp_path: Path, shape: Callable[[int], str], work: Callable[[System], object], few: int
-) -> None:
-    small, large = made(tmp_path, shape(few)), made(tmp_path, shape(4 * few))
-    work(small)  # what is done once in a process
-    less, more = seconds(lambda: work(small), lambda: work(large))
-    assert more <= 5 * less
 
 
 def at_least(name: str, least: int) -> Compare:
