@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import time
 from array import array
 from collections.abc import Callable, Iterable, Sequence
@@ -17,7 +18,7 @@ from .explore import Graph, System
 from .intentions import Frame
 from .interpreter import BITS, QUEUE, Agent
 from .mind import NONE
-from .psl import Atom, Formula, Modality, Not, atoms, automaton_of, compiled, conjunction
+from .psl import TRUE, Atom, Formula, Modality, Not, atoms, automaton_of, compiled, conjunction
 from .syntax import DeedKind, Sign
 from .tautology import Laws, is_valid, standing
 from .terms import Struct, Term, named_apart, unify
@@ -147,9 +148,11 @@ class Result:
     the claim into a tautology."""
     answered: bool = False
     """The forbidden formula is the agent's answer to the trigger (`Checker._answered`)."""
+    excluded: bool = False
+    """It fails on a run that the fairness assumptions exclude, and from some state no fair run goes on."""
 
 
-@dataclass(slots=True)
+@dataclass
 class Checker:
     """Checks many properties on one graph; the graph is labelled and reduced once."""
 
@@ -189,7 +192,21 @@ class Checker:
                 unmet = conjunction((wanted.trigger, Not(wanted.goal)))
                 immediate = not self._where(unmet)
         answered = not holds and self._answered(wanted)
-        return Result(wanted.key, holds, vacuous, immediate and not valid, valid, answered)
+        excluded = holds and bool(fair) and not self.always_fair and find_lasso(small, automaton) is not None
+        return Result(wanted.key, holds, vacuous, immediate and not valid, valid, answered, excluded)
+
+    @functools.cached_property
+    def always_fair(self) -> bool:
+        """Whether a fair run goes on from every reachable state; otherwise the fairness assumptions exclude states, not
+        only runs (Abadi and Lamport, "An old-fashioned recipe for real time": they are not machine closed)."""
+        anything, fair, labels = self._projected(Property("", Not(TRUE)), self.reduced.labels)
+        graph = Kripke(self.reduced.initial, self.reduced.successors, labels)
+        last: set[int] = set()  # states from which no other component is reached
+        for component in strong_components(graph.initial, graph.successors.__getitem__):
+            members = set(component)
+            if all(members.issuperset(graph.successors[state]) for state in component):
+                last.add(component[0])
+        return all(find_lasso(Kripke((state,), graph.successors, labels), anything, fair) is not None for state in last)
 
     def _answered(self, wanted: Property) -> bool:
         """Whether there is an occasion (the trigger is met, and was not just before) to which the forbidden formula is

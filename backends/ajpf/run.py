@@ -46,6 +46,12 @@ def settle(job: Job, limits: Limits, version: str) -> Report:
     return Report(outcomes, ENGINE, version, (), run.logs, tuple(run.observed))
 
 
+EXCLUDED = (
+    "it holds by the fairness assumptions only, and from some reachable state no fair run goes on: the percepts that "
+    "they name cannot be drawn there"
+)
+
+
 class _Run:
     """The results so far."""
 
@@ -107,7 +113,7 @@ class _Run:
         if result.holds and unfinished is not None:
             return Settled(Verdict.UNKNOWN, f"not refuted, but the state space is unfinished: {unfinished}")
         answer = Verdict.CHECKED if result.holds else Verdict.REFUTED
-        reason = "" if result.holds else self.doubt(p, result.answered)
+        reason = self.doubt(p, result.answered) if not result.holds else EXCLUDED if result.excluded else ""
         verdict = Verdict.UNKNOWN if reason else answer
         return Settled(verdict, reason, answer, result.vacuous, result.immediate, result.valid)
 

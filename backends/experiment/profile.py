@@ -146,7 +146,8 @@ def read_campaign(job: Job, table: Path | None) -> Campaign:
 
 
 def command_files(job: Job) -> tuple[Path, ...]:
-    """The files of the system's folder that the command names, and those under `files`. Never raises."""
+    """The files of the system's folder that the command names, with the modules beside a Python script, which it may
+    import; and those under `files`. Never raises."""
     given = job.options.get("campaign")
     found: dict[Path, None] = {}
     lists = [given.get(key) for key in ("command", "files")] if isinstance(given, Mapping) else []
@@ -161,6 +162,7 @@ def _files(path: Path) -> Iterator[Path]:
         yield from (p for p in sorted(path.rglob("*")) if p.is_file() and "__pycache__" not in p.parts)
     elif path.is_file():
         yield path
+        yield from sorted(p for p in path.parent.glob("*.py") if p != path and path.suffix == ".py")
 
 
 def _parameter(name: str, entry: Any) -> Parameter:

@@ -172,6 +172,25 @@ def test_fairness_must_be_stated_and_then_helps(lift, tmp_path):
     assert settle(lift({"properties": extra}, {"cabin.yaml": unfair}), tmp_path)["answers"].verdict is Verdict.REFUTED
 
 
+def test_fairness_that_some_state_cannot_keep_shows_nothing(lift, tmp_path):
+    """The cabin hears a call, and goes round and round: the fair draw is not offered any more."""
+    program = (
+        "GWENDOLEN\n:name: cabin\n:Initial Beliefs:\n:Reasoning Rules:\n:Initial Goals:\n:Plans:\n"
+        "+!round [achieve] : {True} <- turn;\n+call(1) : {True} <- +!round [achieve];\n+call(2) : {True} <- go(1);\n"
+    )
+    environment = (
+        "draws: {at_quiescence: repeatedly}\npercepts: {calls: [call(1), call(2), nothing]}\n"
+        "after: {turn: {calls: [keep]}}\nfair: [{percept: call(2), because: somebody always calls}]\n"
+    )
+    extra = {"moves": {"psl": "<> D(cabin, go(1))", "guarantee": "answers"}}
+    files = {"cabin.gwen": program, "cabin.yaml": environment}
+    outcome = settle(lift({"properties": extra}, files), tmp_path)["answers"]
+    assert outcome.verdict is Verdict.UNKNOWN
+    assert "no fair run goes on" in outcome.summary
+    offered = {**files, "cabin.yaml": environment.replace("calls: [keep]", "calls: [keep, call(2)]")}
+    assert "no fair run goes on" not in settle(lift({"properties": extra}, offered), tmp_path)["answers"].summary
+
+
 BAD_OPTIONS = {
     "no program": ({"program": "nothing.gwen"}, "there is no file"),
     "outside": ({"program": "../../../etc/passwd"}, "is not a file in the system's folder"),

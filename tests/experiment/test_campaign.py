@@ -153,6 +153,11 @@ def test_what_a_run_depends_on_makes_it_stale(name: str, drawn: Path) -> None:
     assert settle(drawn).verdict is verdict
 
 
+def test_a_module_beside_the_script_is_part_of_the_simulator(drawn: Path) -> None:
+    (drawn / "helper.py").write_text("CLOSE = 0.1\n")
+    assert settle(drawn).verdict is Verdict.UNKNOWN
+
+
 @pytest.mark.parametrize("change", [("in.speed: data", "in.speed: other"), ("by: arrival", "by: order")])
 def test_the_key_covers_the_monitors(change: tuple[str, str], drawn: Path) -> None:
     def keys() -> object:
