@@ -214,14 +214,11 @@ class FormulaQuestion:
     ) -> Answer:
         """`before`: the number of earlier steps needed to prove the next; `by`: invariants that were found."""
         needed = tuple(dict.fromkeys(label for answer in answers for label in answer.needed))
-        beyond = [n for n in _guarantees(composition.frame, needed) if n not in self.support and self.support]
         how = "at the first step, and from one step to the next" if phase is Phase.LATER else "at every step"
         if before > 1:
             how = f"at the first {before} steps, and from each {before} steps to the next"
         named = [label for label in needed if not about_memory(label) and not label.startswith(INVARIANT)]
         summary = f"follows {how} from {', '.join(named) or 'the wiring and the types alone'}"
-        if beyond:
-            summary += f" (not named as its support: {', '.join(beyond)})"
         details: dict[str, object] = {"needed": named, "phase": phase.value} | ({"k": before} if before > 1 else {})
         cases = [Case(phase, one.verdict, one.needed) for one in answers]
         hint = Hint(labels(needed)) if len(cases) == 1 else hint_of(cases[0], replace(cases[1], depth=before))
