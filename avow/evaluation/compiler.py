@@ -1,20 +1,19 @@
-"""Typed terms as closures over a list of slots, quantifiers excluded (`Quantifiers`): evaluation walks no syntax."""
+"""Typed terms as closures over a list of slots, without quantifiers (`Compiler.quantifier`); no syntax is walked."""
 
 from __future__ import annotations
 
 import math
 import operator
-from collections.abc import Callable, Iterator, Mapping, Sequence, Set
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import field
 from fractions import Fraction
 from itertools import product
-from typing import Any, Protocol, assert_never
+from typing import Any, assert_never
 
 from avow.base.optional import complete
 from avow.base.records import dataclass
 from avow.base.tuning.bounds import VALUES_ENUMERATED
 from avow.formulas import values
-from avow.formulas.disjunctions import Part
 from avow.formulas.values import Data, Element, FunctionValue, Value
 from avow.language import sorts as s
 from avow.language import terms as t
@@ -66,36 +65,14 @@ def combinations(
     return None if ranges is None or math.prod(map(len, ranges)) > most else tuple(product(*ranges))
 
 
-class Candidates(Protocol):
-    """The assignments to some variables that a conjunction of parts allows."""
-
-    @property
-    def bound(self) -> Set[str]:
-        """The variables that the parts bind."""
-        ...
-
-    def solutions(self, env: Env) -> Iterator[NotEvaluable | None]:
-        """Binds the variables in `env` before each yield: None, or why it is unknown whether the parts hold there."""
-        ...
-
-
-class Quantifiers(Protocol):
-    """The decision procedure for quantifiers. It is passed to the compiler, since the two recurse: a quantifier's body
-    is a term, and a term may contain quantifiers."""
-
-    def code(self, compiler: Compiler, term: t.Quantified) -> Code:
-        """The closure for a quantified formula, whose variables have slots."""
-        ...
-
-    def candidates(self, compiler: Compiler, parts: Sequence[Part], variables: Sequence[t.Variable]) -> Candidates: ...
-
-
 @dataclass(slots=True)
 class Compiler:
     """Slots for the variables of one term, and the closures for its parts. Bound names are unique in the term."""
 
     domains: Domains
-    quantifiers: Quantifiers
+    quantifier: Callable[[Compiler, t.Quantified], Code]
+    """The closure for a quantified formula, whose variables have slots. It is given, since the two recurse: a
+    quantifier's body is a term, and a term may contain quantifiers."""
     free: dict[str, int] = field(default_factory=dict)
     bound: dict[str, int] = field(default_factory=dict)
     size: int = 0
@@ -176,7 +153,7 @@ class Compiler:
             case t.Quantified():
                 for variable in term.variables:
                     self.bind(variable)
-                return self.quantifiers.code(self, term)
+                return self.quantifier(self, term)
             case t.History(operator=name):
                 raise NotEvaluable(f"`{name}` speaks of other steps")
             case _:

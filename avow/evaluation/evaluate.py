@@ -8,15 +8,14 @@ Quantifiers over finite sorts are enumerated; over infinite ones they are reduce
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from typing import Any
 
-from avow.evaluation.compiler import Candidates, Code, Compiler, Domains, Env, NotEvaluable, finite_values
-from avow.evaluation.quantifier_search import Plan, Search
-from avow.formulas.disjunctions import Part
+from avow.evaluation.compiler import Code, Compiler, Domains, Env, NotEvaluable, finite_values
+from avow.evaluation.quantifier_search import Search
 from avow.formulas.renaming import rename_apart
 from avow.formulas.values import Value
-from avow.language.terms import Quantified, Quantifier, Term, Variable
+from avow.language.terms import Quantified, Quantifier, Term
 
 __all__ = [
     "Domains",
@@ -46,7 +45,7 @@ def compile_term(term: Term, *, domains: Domains | None = None) -> Evaluator:
 
     A function's table must not be changed after it was passed: an index of it may be kept.
     """
-    compiler = Compiler(domains or {}, SEARCHES)
+    compiler = Compiler(domains or {}, quantified)
     code = guarded(lambda: compiler.code(rename_apart(term)))
     fill = filler(compiler)
     return lambda valuation: guarded(lambda: code(fill(valuation)))
@@ -57,7 +56,7 @@ def compile_counterexample(term: Term) -> Callable[[Mapping[str, Value]], dict[s
 
     The result, and compiling, raise NotEvaluable. Other formulas have no bound variables to name: always None.
     """
-    compiler = Compiler({}, SEARCHES)
+    compiler = Compiler({}, quantified)
     if not isinstance(term, Quantified) or term.quantifier is not Quantifier.FORALL:
         return lambda valuation: None
     apart = guarded(lambda: rename_apart(term))
@@ -73,24 +72,16 @@ def compile_counterexample(term: Term) -> Callable[[Mapping[str, Value]], dict[s
     return lambda valuation: guarded(lambda: find(valuation))
 
 
-class _Searches:
+def quantified(compiler: Compiler, term: Quantified) -> Code:
     """Quantifiers as searches (`avow.evaluation.quantifier_search`)."""
-
-    def code(self, compiler: Compiler, term: Quantified) -> Code:
-        match term.quantifier:
-            case Quantifier.EXISTS:
-                return Search(compiler, term.variables, term.body, True).exists
-            case Quantifier.FORALL:
-                search = Search(compiler, term.variables, term.body, False)
-                return lambda env: not search.exists(env)
-            case Quantifier.UNIQUE:
-                return Search(compiler, term.variables, term.body, True, unique=True).exactly_one
-
-    def candidates(self, compiler: Compiler, parts: Sequence[Part], variables: Sequence[Variable]) -> Candidates:
-        return Plan(compiler, parts, variables, frozenset(), complete=False, rows=False)
-
-
-SEARCHES = _Searches()
+    match term.quantifier:
+        case Quantifier.EXISTS:
+            return Search(compiler, term.variables, term.body, True).exists
+        case Quantifier.FORALL:
+            search = Search(compiler, term.variables, term.body, False)
+            return lambda env: not search.exists(env)
+        case Quantifier.UNIQUE:
+            return Search(compiler, term.variables, term.body, True, unique=True).exactly_one
 
 
 def filler(compiler: Compiler) -> Callable[[Mapping[str, Value]], Env]:
@@ -118,6 +109,6 @@ def guarded(action: Callable[[], Any]) -> Any:
 
 def free_names(term: Term) -> frozenset[str]:
     """The qualified names that a valuation must contain for the term."""
-    compiler = Compiler({}, SEARCHES)
+    compiler = Compiler({}, quantified)
     compiler.code(rename_apart(term))
     return frozenset(compiler.free)

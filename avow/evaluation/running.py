@@ -8,7 +8,7 @@ from typing import assert_never
 
 from avow.base.tuning.bounds import INSTANCES, TABLE_ROUNDS
 from avow.evaluation.compiler import Compiler, NotEvaluable, finite_values
-from avow.evaluation.evaluate import SEARCHES, Evaluator, compile_term, filler, guarded
+from avow.evaluation.evaluate import Evaluator, compile_term, filler, guarded, quantified
 from avow.evaluation.quantifier_search import Search
 from avow.formulas.formula import conjunction, disjunction, equation, negation, opposite
 from avow.formulas.renaming import rename_apart
@@ -76,7 +76,7 @@ def _compile_table(term: Term, parameters: Sequence[Variable], instances: int) -
     kept = Variable(Role.INPUT, "kept#", s.FunctionSort(tuple(v.sort for v in parameters), term.sort))
     now = compile_term(term)
     body = rename_apart(_differ(term, Apply(kept, tuple(parameters), term.sort)), [v.name for v in parameters])
-    compiler = Compiler({}, SEARCHES)
+    compiler = Compiler({}, quantified)
     search = guarded(lambda: Search(compiler, tuple(parameters), body, True))
     fill = filler(compiler)
     names = tuple(v.name for v in parameters)

@@ -16,7 +16,7 @@ from avow.language.printer import show_sort
 from avow.language.scope import Scope
 from avow.language.sorts import BOOL, INTEGER, NATURAL, REAL, STRING, EnumSort, Sort, TupleSort
 from avow.language.source import Reports
-from avow.language.syntax import BuiltinName, Name, NodePort, Number, Syntax, TermSyntax, Text
+from avow.language.syntax import Name, NodePort, Number, Syntax, TermSyntax, Text
 from avow.language.terms import Construct, EnumValue, Item, Literal, Past, Role, Term, Variable
 
 
@@ -117,9 +117,6 @@ class Names(ABC):
         return Literal(unquote(tree.text), STRING, self.span(tree))
 
     # --- names -------------------------------------------------------------------------------------------------------
-
-    def builtin(self, tree: BuiltinName) -> None:
-        self.error("RCL204", f"{tree.text} is a type, not a value", tree)
 
     def name(self, tree: Name, expected: Sort | None) -> Term | None:
         name = tree.text

@@ -206,9 +206,6 @@ class Terms(Names):
             if sort is not None and self.scope.environment.constants.get(tree.text) is None:
                 self.not_a_set(tree, show_sort(sort))
                 return None
-        if isinstance(tree, syntax.BuiltinName):
-            self.not_a_set(tree, tree.text)
-            return None
         expected: s.Sort | None = None
         if item is not None:
             expected = s.SetSort(item) if isinstance(tree, syntax.SetDisplay) else s.SequenceSort(item)

@@ -24,7 +24,7 @@ from avow.language.lexer import Token
 from avow.language.operators import conditional
 from avow.language.printer import show_sort
 from avow.language.scope import Defined
-from avow.language.sorts import BOOL, BUILTINS, REAL, FunctionSort, SequenceSort, SetSort, Sort, TupleSort
+from avow.language.sorts import BOOL, BUILTINS, FunctionSort, SequenceSort, SetSort, Sort, TupleSort
 from avow.language.subterms import subterms
 from avow.language.syntax import Syntax, TermSyntax
 
@@ -83,9 +83,6 @@ class Checker(Histories):
                 return self.range_of(tree)
             case syntax.Text():
                 return self.string(tree)
-            case syntax.BuiltinName():
-                self.builtin(tree)
-                return None
             case _:
                 assert_never(tree)
 
@@ -206,8 +203,6 @@ class Checker(Histories):
     def type_in_term(self, tree: syntax.TermSyntax) -> Sort | None:
         """The sort that a term-like text names: ``REAL``, ``RadStat``, ``(REAL, REAL)``; None if it names none."""
         match tree:
-            case syntax.BuiltinName(text=text):
-                return BUILTINS.get(text, REAL)
             case syntax.Name(text=name):
                 return None if name in self.scope.bound else self.scope.environment.sort(name)
             case syntax.TupleDisplay(items=parts):

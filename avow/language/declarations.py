@@ -187,7 +187,7 @@ class Declarations:
 
     def fresh_names(self, trees: Sequence[syntax.TermSyntax]) -> list[syntax.Name]:
         """The trees that are undeclared names."""
-        taken = (self.declared, self.owners, self.environment.elements)
+        taken = (self.declared, self.owners, self.environment.elements, s.BUILTINS)
         return [t for t in trees if isinstance(t, syntax.Name) and not any(t.text in names for names in taken)]
 
     def needed_by(self, value: syntax.TermSyntax) -> None:
@@ -209,11 +209,9 @@ class Declarations:
     def type_of(self, tree: syntax.TypeSyntax, reports: Reports, name: str) -> s.Sort | None:
         """The sort that a type denotes; `name` is the name for a new set of names."""
         match tree:
-            case syntax.BuiltinType(text=text):
-                return s.BUILTINS.get(text, s.BUILTINS["REAL"])
-            case syntax.NamedType():
+            case syntax.Name():
                 return self.named(tree, reports)
-            case syntax.UnspecifiedType():
+            case syntax.SetType(elements=()):
                 return s.OpaqueSort(self.free_name(name))
             case syntax.SetType(elements=elements):
                 return self.set_of(elements, reports, name)
@@ -254,7 +252,7 @@ class Declarations:
         own = name if declared is not None and declared.state == "open" else ""
         return s.TupleSort(kept, tuple(seen), own) if sound and len(kept) == len(items) else None
 
-    def named(self, tree: syntax.NamedType, reports: Reports) -> s.Sort | None:
+    def named(self, tree: syntax.Name, reports: Reports) -> s.Sort | None:
         name = tree.text
         environment = self.environment
         other = self.declared.get(name)
@@ -392,7 +390,7 @@ def _names(tree: syntax.Syntax) -> set[str]:
     """Every name that occurs in a type or value."""
     found: set[str] = set()
     for part in syntax.walk(tree):
-        if isinstance(part, syntax.Name | syntax.NamedType):
+        if isinstance(part, syntax.Name):
             found.add(part.text)
         elif isinstance(part, syntax.NodePort):
             found.add(part.node)

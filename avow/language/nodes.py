@@ -19,7 +19,7 @@ from avow.language.scope import Defined, Scope
 from avow.language.sorts import BoolSort, EnumSort, IntegerSort, NaturalSort, RealSort, Sort, StringSort
 from avow.language.source import Reports
 from avow.language.subterms import histories, term_extent
-from avow.language.syntax import ClauseSyntax, NodeSyntax, PortDeclaration, RosType, UnspecifiedType
+from avow.language.syntax import ClauseSyntax, NodeSyntax, PortDeclaration, RosType, SetType
 from avow.language.terms import Role, Term
 from avow.language.units import BASES, DERIVED, ONE_UNIT, clashes, unit
 from avow.ros.calls import part_topic
@@ -53,7 +53,7 @@ def check_ports(
                 node.broken.add(name.text)
                 continue
             written = flat_text(reports.source.text[part.type.start : part.type.end])
-            type_name = show_type(sort) if isinstance(part.type, UnspecifiedType) else written
+            type_name = show_type(sort) if isinstance(part.type, SetType) and not part.type.elements else written
             span = reports.source.span(name.start, name.end)
             measured = _unit(part, sort, reports)
             parameter = _is_parameter(part, sort, reports)

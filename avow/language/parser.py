@@ -165,9 +165,7 @@ _CALLBACKS: dict[str, Callable[[list[Any]], Any]] = {
     # types
     "function_type": lambda c: _made(syntax.FunctionType, c, c[0], c[2]),
     "product_type": lambda c: _made(syntax.ProductType, c, tuple(c[::2]), tuple(c[1::2])),
-    "named_type": _word(syntax.NamedType),
-    "builtin_type": _word(syntax.BuiltinType),
-    "unspecified_type": lambda c: _made(syntax.UnspecifiedType, c),
+    "named_type": _word(syntax.Name),
     "sequence_type": lambda c: _made(syntax.SequenceType, c, c[1]),
     "record_type": _record,
     "set_type": _listed(syntax.SetType),
@@ -184,7 +182,6 @@ _CALLBACKS: dict[str, Callable[[list[Any]], Any]] = {
     "negative": lambda c: _made(syntax.Minus, c, c[1]),
     "application": lambda c: _made(syntax.Application, c, c[0], tuple(c[2:-1:2])),
     "name": _word(syntax.Name),
-    "builtin": _word(syntax.BuiltinName),
     "number": _word(syntax.Number),
     "string": _word(syntax.Text),
     "truth": lambda c: _made(syntax.Truth, c, c[0].text == "TRUE"),

@@ -8,7 +8,7 @@ from dataclasses import field
 from avow.base.diagnostics import Span
 from avow.base.records import dataclass
 from avow.language.contract import Contract, Definition, Node, Port
-from avow.language.sorts import DataSort, EnumSort, Sort, parts
+from avow.language.sorts import BUILTINS, DataSort, EnumSort, Sort, parts
 from avow.language.source import Reports
 from avow.language.syntax import Define
 from avow.language.terms import Role, Term, Variable
@@ -28,7 +28,7 @@ class Environment:
 
     def sort(self, name: str) -> Sort | None:
         """The sort of that name, including generated names of sorts that were written in place."""
-        return self.types.get(name) or self.anonymous.get(name)
+        return BUILTINS.get(name) or self.types.get(name) or self.anonymous.get(name)
 
     def add_elements(self, sort: Sort) -> None:
         """Register the elements of a declared sort, and of those written in place in it."""
@@ -135,7 +135,7 @@ class Scope:
         ):
             if name in table:
                 return what, environment.places.get(name)
-        return None
+        return ("a type", None) if name in BUILTINS else None
 
     def known(self) -> Iterator[str]:
         """Every name that may denote a value here."""

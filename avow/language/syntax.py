@@ -91,12 +91,7 @@ class Ahead(Application):
 
 @dataclass(frozen=True, slots=True)
 class Name(_Placed):
-    text: str
-
-
-@dataclass(frozen=True, slots=True)
-class BuiltinName(_Placed):
-    """``REAL`` where a term is expected."""
+    """Also of a type, and of a built-in one."""
 
     text: str
 
@@ -248,7 +243,6 @@ TermSyntax = (
     | Minus
     | Application
     | Name
-    | BuiltinName
     | Number
     | Text
     | Truth
@@ -287,21 +281,6 @@ class ProductType(_Placed):
 
 
 @dataclass(frozen=True, slots=True)
-class NamedType(_Placed):
-    text: str
-
-
-@dataclass(frozen=True, slots=True)
-class BuiltinType(_Placed):
-    text: str
-
-
-@dataclass(frozen=True, slots=True)
-class UnspecifiedType(_Placed):
-    """``{}``."""
-
-
-@dataclass(frozen=True, slots=True)
 class Element(_Placed):
     """``red``, or the constructor ``move(REAL, REAL)``."""
 
@@ -311,6 +290,8 @@ class Element(_Placed):
 
 @dataclass(frozen=True, slots=True)
 class SetType(_Placed):
+    """``{}``, the unspecified type, has no elements."""
+
     elements: tuple[Element, ...]
 
 
@@ -332,8 +313,7 @@ class RecordType(_Placed):
 
 
 TypeSyntax = (
-    FunctionType | ProductType | NamedType | BuiltinType | UnspecifiedType | SetType
-    | TupleType | RecordType | SequenceType
+    FunctionType | ProductType | Name | SetType | TupleType | RecordType | SequenceType
 )  # fmt: skip
 
 

@@ -25,7 +25,6 @@ from avow.language.syntax import (
     FieldOf,
     FileSyntax,
     Name,
-    NamedType,
     NodePort,
     NodeSyntax,
     PortName,
@@ -243,7 +242,7 @@ class _Reader:
     def in_type(self, tree: Syntax) -> Iterator[Occurrence]:
         for part in walk(tree):
             match part:
-                case NamedType(text=name):
+                case Name(text=name):
                     if name in self.environment.types:
                         yield from self.at(Meaning(What.TYPE, name), part.start, part.end)
                 case RecordType(fields=fields):

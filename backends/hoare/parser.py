@@ -16,7 +16,6 @@ from avow.base.grammars import lark_of
 from avow.base.records import dataclass
 from avow.language import lexer
 from avow.language import syntax as rcl
-from avow.language.sorts import BUILTINS
 from avow.language.source import Source
 from avow.language.terms import Quantifier
 
@@ -260,8 +259,7 @@ class _Build(Transformer_NonRecursive):  # type: ignore[misc]
 
     def group(self, meta: Any, items: list[Token]) -> rcl.Binder:
         *names, _, sort = items
-        kind = rcl.BuiltinName if sort in BUILTINS else rcl.Name
-        domain = kind(sort.start_pos or 0, sort.end_pos or 0, 1, str(sort))
+        domain = rcl.Name(sort.start_pos or 0, sort.end_pos or 0, 1, str(sort))
         return rcl.Binder(meta.start_pos, meta.end_pos, 1, tuple(_token("NAME", n) for n in names), domain)
 
     def quantified(self, meta: Any, items: list[Any]) -> Any:
