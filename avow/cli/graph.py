@@ -11,16 +11,15 @@ from avow.base.diagnostics import refuse
 from avow.cli.options import ContractArgument, json_option, system_of
 from avow.system.folding import seen
 from avow.system.graph import dataflow
-from avow.system.graph_svg import sheet, texts
+from avow.system.graph_svg import sheet
 from avow.system.wiring import wiring
 
 
 @click.command()
 @click.argument("path", metavar="SYSTEM", type=ContractArgument())
 @click.option("--svg", "as_svg", is_flag=True, help="The dataflow as a picture, nothing else.")
-@click.option("--flow", "as_flow", is_flag=True, help="What each node gets from where, providers first.")
 @json_option()
-def command(path: Path, as_svg: bool, as_flow: bool, as_json: bool) -> int:
+def command(path: Path, as_svg: bool, as_json: bool) -> int:
     """Show how a system is wired.
 
     SYSTEM is a system's name or folder, or an .rcl file. Of each node the name under which it runs and its remappings;
@@ -35,8 +34,6 @@ def command(path: Path, as_svg: bool, as_flow: bool, as_json: bool) -> int:
         click.echo(document({"system": system.name, **found.json()}))
     elif as_svg:
         click.echo(sheet(seen(system, graph)))
-    elif as_flow:
-        click.echo(texts(seen(system, graph)))
     else:
         click.echo(found.text())
     return 0

@@ -1,4 +1,4 @@
-"""The dataflow graph as a drawing, with layers from left to right, without any tool; and as text for a terminal."""
+"""The dataflow graph as a drawing, with layers from left to right, without any tool."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ from avow.base.graphs import components
 from avow.base.records import dataclass
 from avow.base.tuning.shown import NODES_DRAWN, SUBSYSTEMS_DRAWN
 from avow.system.graph import Graph
-from avow.system.plan import Edge
 
 _WIDTH, _HEIGHT = 150, 46
 _GAP_X, _GAP_Y = 110, 34
@@ -141,36 +140,6 @@ def _ordered(columns: list[list[str]], links: Sequence[_Link]) -> list[list[str]
 
 def _middle(rows: Sequence[float]) -> float:
     return sum(rows) / len(rows) if rows else 0.0
-
-
-def text(graph: Graph, outside: str = "environment") -> str:
-    """The graph as lines of text: the inputs of each node and their sources, providers first; `outside`: the rest."""
-    lines: list[str] = []
-    for layer in _layers(graph):
-        for node in layer:
-            lines.append(node)
-            lines += [f"  ← {_edge_text(edge)}" for edge in graph.feeding(node)]
-            lines += [f"  ← {e.port} ({outside})" for e in graph.environment if e.node == node]
-            lines += [f"  → {e.port} (feeds nothing)" for e in graph.dangling if e.node == node]
-    for cycle in graph.deadlocks:
-        lines.append(f"start-up deadlock: {' → '.join((*cycle, cycle[0]))}")
-    return "\n".join(lines)
-
-
-def texts(parts: Sequence[tuple[str, Graph]]) -> str:
-    """As `text`, for a system and for the inside of each of its subsystems (`avow.system.folding.seen`)."""
-    found = []
-    for name, graph in parts:
-        lines = text(graph, "from outside" if name else "environment")
-        found.append(f"inside {name}:\n" + "\n".join(f"  {line}" for line in lines.splitlines()) if name else lines)
-    return "\n\n".join(found)
-
-
-def _edge_text(edge: Edge) -> str:
-    port = edge.target.port if edge.target.port == edge.source.port else f"{edge.target.port} from {edge.source.port}"
-    later = f", one step later, first {edge.initial}" if edge.delayed and edge.initial else ""
-    later = later or (", one step later" if edge.delayed else "")
-    return f"{port} of {edge.source.node}{later}"
 
 
 def _layers(graph: Graph) -> list[list[str]]:

@@ -22,7 +22,8 @@ from avow.cli.graph import command as graph_command
 from avow.cli.refines import command as refines_command
 from avow.cli.simulate import command as simulate_command
 from avow.system.graph import dataflow
-from avow.system.graph_svg import sheet, text
+from avow.system.graph_svg import sheet
+from avow.system.wiring import wiring
 
 from .make import make, node
 
@@ -92,7 +93,7 @@ def test_compose_json(tmp_path: Path) -> None:
 
 def test_compose_other_outputs(tmp_path: Path) -> None:
     make(tmp_path, GOOD)
-    assert "← x of a" in invoke(graph_command, str(tmp_path), "--flow")[1]
+    assert "a.x → b.x" in invoke(graph_command, str(tmp_path))[1]
     assert "guarantee b_G1" in invoke(compose_command, str(tmp_path), "--rcl")[1]
 
 
@@ -166,9 +167,9 @@ def test_pictures(tmp_path: Path) -> None:
     assert ElementTree.fromstring(picture).tag.endswith("svg")
     assert picture.count("<rect") == 2
     assert picture.count("stroke-dasharray") == 1
-    drawn = text(dataflow(system))
-    assert "← last from y of b, one step later, first 1" in drawn
-    assert "← e (environment)" in drawn
+    drawn = wiring(system, dataflow(system)).text()
+    assert "b.y → b.last, one step later" in drawn
+    assert "b.e" in drawn
 
 
 def test_requirements_have_their_verdicts_in_json_and_in_the_api(tmp_path: Path) -> None:

@@ -16,12 +16,11 @@ from avow.calculus.export import derived_contract
 from avow.calculus.notation import write_goal
 from avow.calculus.obligations import composition_obligations
 from avow.cli.compose import command
-from avow.cli.graph import command as graph_command
 from avow.language.load import check_text
 from avow.language.translate import to_rcl
 from avow.system.folding import seen
 from avow.system.graph import dataflow
-from avow.system.graph_svg import sheet, texts
+from avow.system.graph_svg import sheet
 
 from .make import make, node, outcomes
 from .test_commands import invoke
@@ -345,13 +344,10 @@ def test_the_graph_shows_subsystems_as_nodes(tmp_path: Path) -> None:
         ("sensor", "source"),
         ("reader", "grader"),
     ]
-    assert "inside sensor:\n  reader\n    ← raw (from outside)\n  grader\n    ← value of reader" in texts(parts)
-    assert "feeds nothing" not in texts(parts), "what feeds a node inside feeds something"
+    assert not [at for _, graph in parts for at in graph.dangling], "what feeds a node inside feeds something"
     drawn = sheet(parts)
     assert drawn.count("<svg") == 1
     assert drawn.count(">inside ") == 3
-    code, shown = invoke(graph_command, str(tmp_path), "--flow")
-    assert (code, shown.strip()) == (0, texts(parts).strip())
 
 
 def test_the_listing_and_json_show_the_derived_contract(tmp_path: Path) -> None:
