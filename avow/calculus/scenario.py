@@ -6,7 +6,6 @@ The scenario restricts which values are *tried*; whether a guarantee holds for t
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import suppress
 from fractions import Fraction
 
 from avow.base.diagnostics import Diagnostic, Rejected, Severity
@@ -18,15 +17,14 @@ from avow.base.verdict import Hypothesis, bound
 from avow.calculus.variables import Frame, frame
 from avow.evaluation.compiler import combinations
 from avow.evaluation.evaluate import NotEvaluable, evaluate, finite_values
-from avow.formulas.finite import Ranges
 from avow.formulas.formula import free_variables
 from avow.formulas.temporal.ages import CLOCK
 from avow.formulas.temporal.clock import pace_of
 from avow.formulas.values import Data, FunctionValue, Opaque, Value
 from avow.language import sorts as s
-from avow.language.contract import Node, Port
+from avow.language.contract import Port
 from avow.language.subterms import histories
-from avow.language.terms import Term, Variable
+from avow.language.terms import Term
 from avow.system.names import ports_named
 from avow.system.plan import STEP_LENGTH, Scenario, System
 
@@ -235,26 +233,6 @@ def world(frame: Frame) -> World:
         if sort is not None and not isinstance(sort, s.FunctionSort):
             found.domains[sort] = tuple(dict.fromkeys(found.parse(text, sort) for text in texts))
     return found
-
-
-def ranges(whole: Frame, node: Node) -> Ranges:
-    """The few values that the scenario gives to sorts, and to this node's inputs that are not functions. Values that
-    cannot be read give no range (the plan's checks report them)."""
-    scenario = whole.system.plan.scenario
-    if scenario is None or not scenario.domains:
-        return Ranges()
-    try:
-        found = world(whole)
-    except CannotRun:
-        return Ranges()
-    inputs: dict[Variable, tuple[Value, ...]] = {}
-    for port in node.inputs:
-        texts = found.domain(("in", node.name), port)
-        if texts is None or isinstance(port.sort, s.FunctionSort):
-            continue
-        with suppress(CannotRun):
-            inputs[port.variable] = tuple(found.parse(text, port.sort) for text in texts)
-    return Ranges(found.domains, inputs)
 
 
 def excluded(system: System) -> Iterator[Diagnostic]:

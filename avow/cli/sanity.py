@@ -14,7 +14,6 @@ from rich.text import Text
 from avow.base.codec import document
 from avow.base.verdict import Counterexample, Verdict
 from avow.calculus import providers
-from avow.calculus.scenario import ranges
 from avow.calculus.variables import frame
 from avow.cli.options import (
     ContractArgument,
@@ -54,12 +53,11 @@ def command(path: Path, nodes: tuple[str, ...], as_json: bool, everything: bool,
 
     def settle(node: Node) -> tuple[SanityResult, ...]:
         scenario = interpretation(node, system.plan.scenario)
-        own = analyse(node, scenario=scenario, ranges=found[node.name], bounds=bounds)
+        own = analyse(node, scenario=scenario, bounds=bounds)
         return own + providers.settle(linked[node.name], node, bounds)
 
     whole = frame(system)
     chosen = [node for node in system.contract.nodes if not nodes or node.name in nodes]
-    found = {node.name: ranges(whole, node) for node in chosen}
     linked = {node.name: providers.provider_claims(whole, node) for node in chosen}
     with ThreadPoolExecutor(os.cpu_count()) as pool:  # Z3 lets other threads run while it searches
         results = [result for found in pool.map(settle, chosen) for result in found]

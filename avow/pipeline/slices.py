@@ -15,9 +15,8 @@ from avow.backend_kit.protocol import Backend, Job
 from avow.base.records import dataclass
 from avow.base.remembered import by_identity
 from avow.calculus.providers import ProviderClaim, provider_claims
-from avow.calculus.scenario import ranges
 from avow.calculus.variables import Frame
-from avow.formulas.finite import Ranges, interpretation
+from avow.formulas.finite import interpretation
 from avow.formulas.values import Value
 from avow.language.contract import Clause, Contract, Node
 from avow.language.terms import TRUE, Variable
@@ -34,7 +33,6 @@ class SanitySlice:
     system: str
     node: Node
     given: Mapping[Variable, Value]
-    ranges: Ranges
     linked: tuple[ProviderClaim, ...]
 
 
@@ -62,7 +60,6 @@ def sanity_slice(whole: Frame, node: Node) -> SanitySlice:
         whole.system.name,
         node,
         interpretation(node, whole.system.plan.scenario),
-        ranges(whole, node),
         provider_claims(whole, node),
     )
 

@@ -24,7 +24,6 @@ from avow.calculus.composition import Composition, composed
 from avow.calculus.obligations import all_tasks
 from avow.calculus.variables import Frame
 from avow.evidence.obligation import SYSTEM_LEVEL, Kind, Obligation
-from avow.formulas.finite import Ranges
 from avow.formulas.formula import node_digest, sort_digest
 from avow.language.contract import Contract, Node
 from avow.pipeline.blobs import encode
@@ -128,7 +127,7 @@ def sanity_claims(cut: SanitySlice) -> tuple[tuple[Obligation, ...], Mapping[str
         )
         for claim, digest in (*of_the_node, *of_its_providers)
     )
-    scenario = encode((cut.given, cut.ranges), Path()).decode() if cut.given or cut.ranges != Ranges() else _no_values()
+    scenario = encode(cut.given, Path()).decode() if cut.given else _no_values()
     return obligations, _keys(obligations, SANITY, engine_identity(), scenario)
 
 
@@ -136,7 +135,7 @@ def sanity_claims(cut: SanitySlice) -> tuple[tuple[Obligation, ...], Mapping[str
 def _no_values() -> str:
     """A scenario's part for a node without values for its inputs."""
 
-    return encode(({}, Ranges()), Path()).decode()
+    return encode({}, Path()).decode()
 
 
 def compose_work(composition: Composition) -> Work:

@@ -183,7 +183,7 @@ def discharge_sanity(cut: SanitySlice, obligations: Sequence[Obligation], limits
         bounds = replace(bounds, effort=from_seconds(limits.seconds))
     linked = {asked.claim.name: asked for asked in cut.linked}
     own = {o.id: o.name for o in obligations if o.name not in linked}
-    found = outcomes(cut.node, own, scenario=cut.given, ranges=cut.ranges, bounds=bounds)
+    found = outcomes(cut.node, own, scenario=cut.given, bounds=bounds)
     found += providers.outcomes(cut.node, {o.id: linked[o.name] for o in obligations if o.name in linked}, bounds)
     found = tuple(replace(o, details={**o.details, **effort_told(bounds.effort)}) for o in found)
     return Report(found, "z3", z3_version())

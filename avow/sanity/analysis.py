@@ -18,7 +18,6 @@ from avow.base.remembered import by_identity
 from avow.base.tuning.effort import CONSISTENT_EFFORT
 from avow.base.verdict import Counterexample, Outcome, Verdict
 from avow.evaluation.evaluate import Evaluator, NotEvaluable, compile_term
-from avow.formulas.finite import Ranges
 from avow.formulas.formula import conjunction, disjunction, free_variables, negation, substitute
 from avow.formulas.temporal.cells import remembers
 from avow.formulas.values import Value
@@ -46,20 +45,18 @@ def analyse(
     node: Node,
     *,
     scenario: Given | None = None,
-    ranges: Ranges | None = None,
     bounds: Bounds | None = None,
     wanted: Collection[str] | None = None,
 ) -> tuple[SanityResult, ...]:
     """Decide a node's claims, in order; with `wanted`, only the claims of these names are reported. Earlier claims are
     decided all the same: claims that stay open leave less effort for later ones, and no answer may depend on `wanted`.
-    `scenario` fixes some inputs; `ranges` gives the few values of others (and of quantified variables), if no answer
-    for all values is found.
+    `scenario` fixes some inputs, if no answer for all values is found.
     """
     bounds = bounds or Bounds()
     analysis = (
         OverRuns(node, Patience(bounds.effort), bounds.seed)
         if remembers(node)
-        else _Analysis(node, scenario or {}, ranges or Ranges(), bounds)
+        else _Analysis(node, scenario or {}, bounds)
     )
     results = []
     asked = claims(node)
@@ -76,12 +73,11 @@ def outcomes(
     obligations: Mapping[str, str],
     *,
     scenario: Given | None = None,
-    ranges: Ranges | None = None,
     bounds: Bounds | None = None,
 ) -> tuple[Outcome, ...]:
     """For the pipeline: one outcome for each obligation id, given its claim's name (an unknown name is an error)."""
     wanted = set(obligations.values())
-    found = analyse(node, scenario=scenario, ranges=ranges, bounds=bounds, wanted=wanted)
+    found = analyse(node, scenario=scenario, bounds=bounds, wanted=wanted)
     results = {result.name: result for result in found}
     return tuple(as_outcome(identity, node.name, name, results.get(name)) for identity, name in obligations.items())
 
@@ -89,10 +85,9 @@ def outcomes(
 class _Analysis:
     """One node under analysis. Each claim is decided once and reused by others."""
 
-    def __init__(self, node: Node, scenario: Given, ranges: Ranges, bounds: Bounds) -> None:
+    def __init__(self, node: Node, scenario: Given, bounds: Bounds) -> None:
         self.node = node
         self.scenario = scenario
-        self.ranges = ranges
         self.patience = Patience(bounds.effort)
         self.serious = True
         self.seed = bounds.seed
@@ -182,17 +177,6 @@ class _Analysis:
             within = self._ask(self.assumptions, self.guarantees, limit, given=self.scenario)
             if within.verdict is not Verdict.UNKNOWN:
                 answer, bounded = within, within.verdict is Verdict.PROVED
-        if answer.verdict is Verdict.UNKNOWN and self.ranges:
-            assumed = {label: self.ranges.within(f) for label, f in self.assumptions.items()}
-            free = [v for v in self.inputs if v not in self.scenario]
-            wanted = {label: self.ranges.within(f) for label, f in self.guarantees.items()}
-            assumed |= self.ranges.assumptions(free)
-            within = self._ask(assumed, wanted, limit, given=self.scenario)
-            if within.verdict is Verdict.PROVED and self._some(
-                assumed
-            ):  # a refutation need not be one where quantifiers range over everything
-                needed = tuple(label for label in within.needed if label in self.assumptions)
-                answer, bounded = replace(within, needed=needed), True
         self.answer = answer, bounded
         if answer.verdict is Verdict.UNKNOWN:
             self.patience.lose(spent() - start)
@@ -360,10 +344,6 @@ class _Analysis:
     ) -> Realizability:
         about = self.inputs, self.outputs, assumed, wanted
         return realizable(*about, given=given, effort=effort, seed=self.seed, doubtful=doubtful)
-
-    def _some(self, assumed: Mapping[str, Term]) -> bool:
-        """Whether any input of the scenario satisfies these: without one, nothing has been checked."""
-        return solve(assumed, effort=self.limit, given=self.scenario, values="unused").status == "sat"
 
     def _if_refuted(self, name: str) -> str | None:
         return name if name in self.claims and self._other(name).verdict is Verdict.REFUTED else None

@@ -85,7 +85,7 @@ class Patience:
 
 WITHIN = bound(
     "scenario.values",
-    "scenario: inputs and quantified variables have the values that the plan's scenario gives them, and no others",
+    "scenario: inputs have the values that the plan's scenario gives them, and no others",
 )
 
 

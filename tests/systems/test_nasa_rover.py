@@ -391,5 +391,5 @@ def test_that_a_plan_begins_at_the_start_does_not_follow_from_the_rest(planner: 
     system = load_system(FOLDER)
     whole, node = frame(system), system.contract.node(planner)
     cut = sanity_slice(whole, node)
-    (found,) = analyse(node, scenario=cut.given, ranges=cut.ranges, wanted={"not-redundant-from_start"})
+    (found,) = analyse(node, scenario=cut.given, wanted={"not-redundant-from_start"})
     assert found.verdict in (Verdict.PROVED, Verdict.UNKNOWN)

@@ -105,9 +105,6 @@ DISJUNCTIONS_MADE = 16
 """Disjunctions of conjunctions that would become more than so many disjunctions are left as they are: their numbers
 multiply."""
 
-VALUES_WRITTEN_OUT = 400
-"""A quantifier over more (combinations of) values stays as it is, and ranges over everything."""
-
 AUTOMATON_NODES = 5_000
 """Nodes of a property's automaton: the tableau is exponential in the property's length, and one so large is a slip
 rather than a requirement."""
