@@ -13,14 +13,14 @@ from typing import Any
 
 from avow.base.codec import document, plain
 from avow.base.diagnostics import Diagnostic, Rejected
-from avow.language.contract import Clause, Contract, Node, Port, Topic
+from avow.language.contract import Clause, Contract, Port, Topic
 from avow.language.definitions import show_clause
 from avow.language.format import format_text
 from avow.language.lexer import quote
 from avow.language.load import check_text
 from avow.language.nodes import PARAMETER
 from avow.language.printer import show_sort, show_term, show_type
-from avow.language.sorts import BOOL, Constructor
+from avow.language.sorts import BOOL
 from avow.language.terms import Conditional, Literal, Term
 
 
@@ -143,59 +143,25 @@ def to_unicode(contract: Contract) -> str:
 
 
 def to_json(contract: Contract) -> str:
-    """The contract as data: every formula as RCL text and as a tree (`"kind"` names the term, `"sort"` its sort)."""
-    return document(_contract(contract)) + "\n"
+    """The contract as data: its dataclasses, without places, each with its `kind`. The sort of a port or term is its
+    declared name, or written out."""
+    named = dict(contract.types).keys()
+
+    def data(value: Any) -> Any:
+        if isinstance(value, tuple):
+            return [data(item) for item in value]
+        if not dataclasses.is_dataclass(value):
+            return plain(value)
+        found: dict[str, Any] = {"kind": type(value).__name__.removesuffix("Sort").lower()}
+        for field in dataclasses.fields(value):
+            part = getattr(value, field.name)
+            if field.name == "sort":
+                found["sort"] = show_sort(part, named=named)
+            elif field.name not in _INTERNAL:
+                found[field.name] = data(part)
+        return found
+
+    return document(data(contract)) + "\n"
 
 
-def _contract(contract: Contract) -> dict[str, Any]:
-    return {
-        "types": [{"name": name, "sort": _data(sort)} for name, sort in contract.types],
-        "constants": [
-            {"name": n, "value": show_term(t, "rcl"), "term": _data(t), "sort": _data(t.sort)}
-            for n, t in contract.constants
-        ],
-        "nodes": [_node(node) for node in contract.nodes],
-    }
-
-
-def _node(node: Node) -> dict[str, Any]:
-    return {
-        "name": node.name,
-        "inputs": [_port(p) for p in node.inputs],
-        "outputs": [_port(p) for p in node.outputs],
-        "topics": [
-            {
-                "type": t.ros_type,
-                "name": t.name,
-                "matches": f"{t.port.role}.{t.port.name}" if t.port is not None else None,
-            }
-            for t in node.topics
-        ],
-        "assumptions": [_clause(c) for c in node.assumptions],
-        "guarantees": [_clause(c) for c in node.guarantees],
-    }
-
-
-def _port(port: Port) -> dict[str, Any]:
-    more = ({"parameter": True} if port.parameter else {}) | ({"unit": port.unit} if port.unit else {})
-    return {"name": port.name, "type": port.type_name, "sort": _data(port.sort)} | more
-
-
-def _clause(clause: Clause) -> dict[str, Any]:
-    return {
-        "name": clause.name,
-        "sentence": clause.sentence,
-        "formula": show_term(clause.formula, "rcl"),
-        "term": _data(clause.formula),
-    }
-
-
-def _data(value: Any) -> Any:
-    """A term or a sort as plain data, with its kind. The sort of a term is given by name or as written."""
-    if isinstance(value, tuple):
-        return [_data(item) for item in value]
-    if not dataclasses.is_dataclass(value):
-        return plain(value)
-    kind = {} if isinstance(value, Constructor) else {"kind": type(value).__name__.removesuffix("Sort").lower()}
-    parts = [(field.name, getattr(value, field.name)) for field in dataclasses.fields(value) if field.name != "span"]
-    return kind | {name: show_sort(part) if name == "sort" else _data(part) for name, part in parts}
+_INTERNAL = ("files", "span", "sentence_span", "written", "relay")

@@ -54,7 +54,7 @@ def test_json_is_complete(root: Path) -> None:
         assert [n["name"] for n in data["nodes"]] == [n.name for n in contract.nodes]
         for node, shown in zip(contract.nodes, data["nodes"], strict=True):
             assert [c["name"] for c in shown["guarantees"]] == [c.name for c in node.guarantees]
-            assert all(c["term"]["kind"] for c in shown["guarantees"])
+            assert all(c["formula"]["kind"] for c in shown["guarantees"])
 
 
 def test_words_and_signs(root: Path) -> None:
