@@ -125,7 +125,9 @@ def _say(term: t.Term) -> str:
             return _infix(sign, term)
         case t.Operation(operator=t.Builtin.XOR | t.Builtin.MOD as operator):
             return _infix(operator, term)
-        case t.Operation(operator=operator, arguments=arguments):
+        case t.Operation(
+            operator=t.Builtin.ABS | t.Builtin.MIN | t.Builtin.MAX | t.Builtin.DIV as operator, arguments=arguments
+        ):
             return f"{operator}({', '.join(map(_say, arguments))})"
         case t.History(operator=t.Past.PREVIOUS, arguments=(value, first)):
             return f"{_previous(term)}({_say(first)}, {_say(value)})"

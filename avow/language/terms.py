@@ -11,18 +11,66 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import field, replace
+from enum import StrEnum
 from fractions import Fraction
 from operator import attrgetter
 from typing import Any
 
 from avow.base.diagnostics import Span
 from avow.base.records import dataclass
-from avow.language.operator_names import RESPONSES as RESPONSES
-from avow.language.operator_names import Builtin as Builtin
-from avow.language.operator_names import Past as Past
-from avow.language.operator_names import Quantifier as Quantifier
-from avow.language.operator_names import Role as Role
 from avow.language.sorts import BOOL, DataSort, EnumSort, SequenceSort, SetSort, Sort, TupleSort
+
+
+class Role(StrEnum):
+    """The source of a variable's value."""
+
+    INPUT = "in"
+    OUTPUT = "out"
+    BOUND = "bound"
+
+
+class Quantifier(StrEnum):
+    FORALL = "forall"
+    EXISTS = "exists"
+    UNIQUE = "exists_unique"
+    """Existence and uniqueness of the whole tuple of bound variables."""
+
+
+class Builtin(StrEnum):
+    """An operator that is written like a function: ``xor(p, q)``. `avow.language.operators` defines their meanings."""
+
+    XOR = "xor"
+    ABS = "abs"
+    MIN = "min"
+    MAX = "max"
+    MOD = "mod"
+    DIV = "div"
+
+
+class Past(StrEnum):
+    """An operator that refers to more than one step of a run. `avow.formulas.temporal` defines their meanings."""
+
+    PREVIOUS = "previous"
+    ROSE = "rose"
+    FELL = "fell"
+    CHANGED = "changed"
+    ONCE = "once"
+    HISTORICALLY = "historically"
+    HELD = "held"
+    SINCE = "since"
+    COUNTED = "counted"
+    NEXT = "next"
+    WITHIN = "within"
+    FOR = "for"
+    UNTIL = "until"
+    EVENTUALLY = "eventually"
+    ARRIVED = "arrived"
+    STEPS = "steps"
+    """A node's pace, as a clause by itself: ``steps(at most 100 ms)``; its limit is the time between steps."""
+
+
+RESPONSES = frozenset((Past.NEXT, Past.WITHIN, Past.FOR, Past.UNTIL, Past.EVENTUALLY))
+"""Operators that refer to later steps; allowed only as a clause, or as the right side of its outermost `->`."""
 
 
 class _Node:

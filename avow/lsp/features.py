@@ -9,15 +9,12 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 
 from avow.base.diagnostics import Diagnostic
-from avow.language.contract import Clause, Definition, Node, Port
+from avow.language.contract import Clause, Contract, Node, Port
 from avow.language.definitions import show_clause
 from avow.language.lexer import Token
 from avow.language.load import clean_text
-from avow.language.printer import show_sort, show_term, show_type
+from avow.language.printer import show_term, show_type
 from avow.language.scope import of_contract
-from avow.language.source import Source
-from avow.language.subterms import subterms
-from avow.language.terms import Quantified, Variable
 from avow.lsp.names import CLAUSES, Meaning, Occurrence, Text, What, at_offset, taken_apart
 from avow.lsp.project import Project, about_plan, is_plan, project_of
 from avow.lsp.renaming import all_occurrences
@@ -125,59 +122,40 @@ def references(document: Document, offset: int, declarations: bool = True) -> tu
 
 
 def _about(document: Document, name: Occurrence, status: StatusLookup, sanity: SanityLookup) -> str | None:
-    meaning, contract = name.meaning, document.project.contract
-    owner = next((n for n in contract.nodes if n.name in (meaning.owner, meaning.name)), None)
+    """None if what has the name could not be read."""
+    try:
+        return _of_meaning(document.project.contract, name.meaning, status, sanity)
+    except KeyError:
+        return None
+
+
+def _of_meaning(contract: Contract, meaning: Meaning, status: StatusLookup, sanity: SanityLookup) -> str:
+    name, owner = meaning.name, meaning.owner
     match meaning.what:
         case What.NODE:
-            return "\n\n".join([f"node `{meaning.name}`", *_sane(owner, None, sanity)])
-        case What.INPUT | What.OUTPUT:
-            ports = [p for p in (*owner.inputs, *owner.outputs) if p.name == meaning.name] if owner else []
-            port = (
-                next((p for p in ports if (p in owner.inputs) == (meaning.what is What.INPUT)), None) if owner else None
-            )
-            return _about_port(port, owner) if port is not None and owner is not None else None
+            return "\n\n".join([f"node `{name}`", *_sane(contract.node(name), None, sanity)])
+        case What.INPUT:
+            return _about_port(contract.node(owner).input(name), contract.node(owner))
+        case What.OUTPUT:
+            return _about_port(contract.node(owner).output(name), contract.node(owner))
         case What.ASSUMPTION | What.GUARANTEE:
-            clause = next((c for c in owner.clauses if c.name == meaning.name), None) if owner else None
-            return _about_clause(clause, owner, status, sanity) if clause is not None and owner is not None else None
+            return _about_clause(contract.node(owner).clause(name), contract.node(owner), status, sanity)
         case What.TYPE:
-            return f"type `{meaning.name}` = `{show_type(dict(contract.types)[meaning.name])}`"
+            return f"type `{name}` = `{show_type(dict(contract.types)[name])}`"
         case What.CONSTANT:
-            return f"constant `{meaning.name}` = `{show_term(dict(contract.constants)[meaning.name], 'rcl')}`"
+            return f"constant `{name}` = `{show_term(dict(contract.constants)[name], 'rcl')}`"
         case What.DEFINITION:
-            found = next((d for n in contract.nodes for d in n.definitions if _is_of(d, n, meaning)), None)
-            found = found or next((d for d in contract.definitions if d.name == meaning.name), None)
-            return f"`{found.text}`" if found is not None else f"definition `{meaning.name}`"
+            nodes = (
+                n for n in contract.nodes if owner in ("", n.name)
+            )  # a context's is the same for each that uses it
+            known = {d.name: d for ds in (contract.definitions, *(n.definitions for n in nodes)) for d in ds}
+            return f"`{known[name].text}`"
         case What.ELEMENT:
-            sort = of_contract(contract).elements.get(meaning.name)
-            return f"`{meaning.name}`: an element of `{sort.name}`" if sort is not None else None
+            return f"`{name}`: an element of `{of_contract(contract).elements[name].name}`"
         case What.FIELD:
-            return f"field `{meaning.name}` of a record"
+            return f"field `{name}` of a record"
         case What.VARIABLE:
-            return _about_variable(document, meaning)
-
-
-def _is_of(definition: Definition, node: Node, meaning: Meaning) -> bool:
-    """Whether a node's definition is the intended one; a context's is the same for each node that uses it."""
-    return definition.name == meaning.name and meaning.owner in ("", node.name)
-
-
-def _about_variable(document: Document, meaning: Meaning) -> str:
-    """A quantified variable, with its sort if its clause could be read."""
-    place = next((o for o in document.names if o.declares and o.meaning == meaning), None)
-    source = Source(document.file, document.project.text_of(document.file))
-    for clause in (c for node in document.project.contract.nodes for c in node.clauses):
-        if place is None or clause.span is None or clause.span.file != place.file:
-            continue
-        line, _ = source.place(place.start)
-        if clause.span.line <= line <= clause.span.end_line:
-            for variable in _bound(clause, meaning.name):
-                return f"`{variable.name}` : `{show_sort(variable.sort)}` (quantified)"
-    return f"`{meaning.name}` (quantified)"
-
-
-def _bound(clause: Clause, name: str) -> list[Variable]:
-    quantified = (term for term in subterms(clause.formula) if isinstance(term, Quantified))
-    return [variable for term in quantified for variable in term.variables if variable.name == name]
+            return f"`{name}` (quantified)"
 
 
 def _about_clause(clause: Clause, node: Node, status: StatusLookup, sanity: SanityLookup) -> str:
@@ -192,10 +170,9 @@ def _about_clause(clause: Clause, node: Node, status: StatusLookup, sanity: Sani
     return "\n\n".join([*lines, *_sane(node, clause.name, sanity)])
 
 
-def _sane(node: Node | None, subject: str | None, sanity: SanityLookup) -> list[str]:
+def _sane(node: Node, subject: str | None, sanity: SanityLookup) -> list[str]:
     """A line for each sanity claim about a clause, or (None) about the node and its outputs."""
-    found = sanity(node, subject) if node is not None else ()
-    lines = [f"- {_plain(f'{a.verdict}: {a.claim} {a.explanation}'.strip())}" for a in found]
+    lines = [f"- {_plain(f'{a.verdict}: {a.claim} {a.explanation}'.strip())}" for a in sanity(node, subject)]
     return ["\n".join(lines)] if lines else []
 
 
