@@ -23,7 +23,6 @@ from avow.system.strict_yaml import Piece, read_yaml
 _WORD = re.compile(r"\"(?:[^\"\\\n]|\\.)*\"|[A-Za-z_][A-Za-z0-9_']*|[0-9]+(?:\.[0-9]+)?|\.")
 _PORT = re.compile(r"\b(?:in|out)\s*\.\s*[A-Za-z_]")
 _ROLES = (str(Role.INPUT), str(Role.OUTPUT))
-_FINDINGS = ("expected", "accepted")
 _CLAUSE_KINDS = {"guarantee": What.GUARANTEE, "assumption": What.ASSUMPTION}
 
 
@@ -93,12 +92,11 @@ class _Reader:
         if meaning is not None and self.plan.text.startswith(meaning.name, start):
             yield Occurrence(meaning, self.plan.file, start, start + len(meaning.name))
 
-    def scalar(self, piece: Piece | None, what: Callable[[str], Meaning | None]) -> Iterator[Occurrence]:
-        """A scalar, or each of a list, that is a single name."""
-        for item in piece.each() if piece is not None else ():
-            region = self.region(item.span)
-            if self.plan.text[region.start : region.end] == item.text:
-                yield from self.one(what(item.text), region.start)
+    def single(self, piece: Piece, what: Callable[[str], Meaning | None]) -> Iterator[Occurrence]:
+        """A scalar that is a single name."""
+        region = self.region(piece.span)
+        if self.plan.text[region.start : region.end] == piece.text:
+            yield from self.one(what(piece.text), region.start)
 
     def keys(self, piece: Piece | None) -> Iterator[tuple[str, int, Piece]]:
         """Each key of a mapping, with the place of its text."""
@@ -112,9 +110,6 @@ class _Reader:
 
     def clause(self, node: str, what: What, name: str) -> Meaning | None:
         return Meaning(what, name, node) if name in self.named.get(node, {}).get(what, ()) else None
-
-    def guarantee(self, node: str) -> Callable[[str], Meaning | None]:
-        return lambda name: self.clause(node, What.GUARANTEE, name)
 
     def element(self, name: str) -> Meaning | None:
         return declared(self.environment, name)
@@ -161,78 +156,59 @@ class _Reader:
             case _:  # not the contract's
                 pass
 
-    def formula(self, piece: Piece | None, node: str | None, side: Role = Role.OUTPUT) -> Iterator[Occurrence]:
-        for item in piece.each() if piece is not None else ():
-            yield from self.words(self.region(item.span), node, side)
-
     # -- the plan ------------------------------------------------------------------------------------------------------
 
-    def everything(self, root: Piece) -> Iterator[Occurrence]:
-        for connection in root.each("connections"):
-            for key, side in (("from", Role.OUTPUT), ("to", Role.INPUT)):
-                yield from self.formula(connection.at(key), None, side)
-            source = connection.at("from")
-            yield from self.formula(connection.at("initial"), source.text.partition(".")[0] if source else "")
-        for name, at, entry in self.keys(root.at("environment")):
-            yield from self.words(_Region(at, at + len(name)), "", Role.INPUT)
-            owner = name.partition(".")[0]
-            yield from self.formula(entry.at("assume"), owner if owner in self.ports else "")
-        yield from self.requirements(root)
-        for key in ("compose", "subsystems"):
-            for _, _, goal in self.keys(root.at(key)):
-                for inner in ("select", "nodes"):
-                    yield from self.scalar(goal.at(inner), self.node)
-        for path in (("model", "compound"), ("model", "external"), ("ros", "nodes"), ("nodes",)):
-            for name, at, _ in self.keys(root.at(*path)):
-                yield from self.one(self.node(name), at)
-        for name, _, entry in self.keys(root.at("nodes")):
-            yield from self.method_options(entry.at("methods"), name)
-            for attribute, at, _ in self.keys(entry.at("source", "memory")):
-                yield from self.words(_Region(at, at + len(attribute)), name)
-        yield from self.scenario(root)
-        for key in _FINDINGS:
-            for finding in root.each(key):
-                for inner in ("obligation", "matched"):
-                    for item in finding.each(inner):
-                        yield from self.obligation(item)
-
-    def requirements(self, root: Piece) -> Iterator[Occurrence]:
-        for _, _, requirement in self.keys(root.at("requirements")):
-            for key in ("formula", "temporal"):
-                yield from self.formula(requirement.at(key), None)
-            for item in requirement.each("supported_by"):
-                node, dot, name = item.text.partition(".")
-                region = self.region(item.span)
-                yield from self.one(self.node(node), region.start)
-                if dot:
-                    yield from self.one(self.clause(node, What.GUARANTEE, name), region.start + len(node) + 1)
-
-    def scenario(self, root: Piece) -> Iterator[Occurrence]:
-        for key in ("interpret", "domains"):
-            for name, at, _ in self.keys(root.at("scenario", key)):
-                yield from self.words(_Region(at, at + len(name)), "")
-        for name, _, table in self.keys(root.at("scenario")):
-            if name not in ("interpret", "steps"):
-                for item in _scalars(table):
-                    yield from self.scalar(item, self.element)
-
-    def method_options(self, piece: Piece | None, node: str) -> Iterator[Occurrence]:
-        """The names in the options of a node's methods, at any depth."""
-        for inner in (piece.items or ()) if piece is not None else ():
-            yield from self.method_options(inner, node)
-        if piece is not None and piece.entries is None and piece.items is None:
-            region = self.region(piece.span)
-            if _PORT.search(self.plan.text, region.start, region.end):
-                yield from self.words(region, node)
+    def everything(self, piece: Piece, path: tuple[str, ...] = ()) -> Iterator[Occurrence]:
+        """The names in a piece of the plan, with the keys around it."""
+        for item in piece.items or ():
+            yield from self.everything(item, path)
         for name, at, inner in self.keys(piece):
-            if _PORT.search(name):
-                yield from self.words(_Region(at, at + len(name)), node)
-            if name in ("guarantee", "guarantees"):
-                yield from self.scalar(inner, self.guarantee(node))
-                for one, place, _ in self.keys(inner):
-                    yield from self.one(self.guarantee(node)(one), place)
-            else:
-                yield from self.method_options(inner, node)
+            yield from self.key(path, name, _Region(at, at + len(name)))
+            yield from self.everything(inner, (*path, name))
+        if piece.items is None and piece.entries is None:
+            yield from self.scalar(path, piece)
+
+    def key(self, path: tuple[str, ...], name: str, region: _Region) -> Iterator[Occurrence]:
+        match path:
+            case ("environment",):
+                yield from self.words(region, "", Role.INPUT)
+            case ("nodes",) | ("ros", "nodes") | ("model", "compound" | "external"):
+                yield from self.one(self.node(name), region.start)
+            case ("scenario", "interpret" | "domains"):
+                yield from self.words(region, "")
+            case ("nodes", node, "methods", *_, "guarantee" | "guarantees"):
+                yield from self.one(self.clause(node, What.GUARANTEE, name), region.start)
+            case ("nodes", node, "source", "memory"):
+                yield from self.words(region, node)
+            case ("nodes", node, "methods", *_) if _PORT.search(name):
+                yield from self.words(region, node)
+
+    def scalar(self, path: tuple[str, ...], piece: Piece) -> Iterator[Occurrence]:
+        region = self.region(piece.span)
+        match path:
+            case ("connections", "from") | ("requirements", _, "formula" | "temporal"):
+                yield from self.words(region, None)
+            case ("connections", "to"):
+                yield from self.words(region, None, Role.INPUT)
+            case ("connections", "initial"):
+                yield from self.words(region, "")
+            case ("environment", port, "assume"):
+                owner = port.partition(".")[0]
+                yield from self.words(region, owner if owner in self.ports else "")
+            case ("requirements", _, "supported_by"):
+                node, _, name = piece.text.partition(".")
+                yield from self.one(self.node(node), region.start)
+                yield from self.one(self.clause(node, What.GUARANTEE, name), region.start + len(node) + 1)
+            case ("compose" | "subsystems", _, "select" | "nodes"):
+                yield from self.single(piece, self.node)
+            case ("scenario", table, *_) if table not in ("interpret", "steps"):
+                yield from self.single(piece, self.element)
+            case ("expected" | "accepted", "obligation" | "matched"):
+                yield from self.obligation(piece)
+            case ("nodes", node, "methods", *_, "guarantee" | "guarantees"):
+                yield from self.single(piece, lambda name: self.clause(node, What.GUARANTEE, name))
+            case ("nodes", node, "methods", *_) if _PORT.search(self.plan.text, region.start, region.end):
+                yield from self.words(region, node)
 
     def obligation(self, piece: Piece) -> Iterator[Occurrence]:
         """``node/guarantee/name``, ``node/sanity/not-vacuous-name``."""
@@ -251,11 +227,3 @@ class _Reader:
             if name.startswith(("constrained-", "determined-")):
                 output = name.partition("-")[2]
                 yield from self.one(self.port(node, output, Role.OUTPUT), at + len(name) - len(output))
-
-
-def _scalars(piece: Piece) -> Iterator[Piece]:
-    """The scalars of a list or mapping, at any depth."""
-    for inner in piece.items or (piece.entries or {}).values():
-        yield from _scalars(inner)
-    if piece.items is None and piece.entries is None:
-        yield piece
