@@ -4,8 +4,9 @@ given as a path with a loop (a lasso). Runs are infinite: a path to a state with
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from functools import cache
+from typing import Generic
 
 from avow.base.graphs import strong_components
 from avow.base.records import dataclass
@@ -76,13 +77,11 @@ def accepted_run(
 
     roots = [state * width + node for state in initial for node in automaton.initial if node in nodes(label_of(state))]
 
-    def label(product: int) -> int:
-        return label_of(product // width)
-
+    search = _Search(successors, lambda product: label_of(product // width), fair, automaton)
     for component in strong_components(roots, successors):
-        core = _fair_core(component, successors, label, fair, automaton, width)
+        core = search.fair_core(component)
         if core is not None:
-            return _lasso(roots, core, successors, label, fair, automaton, width)
+            return search.lasso(roots, core)
     return None
 
 
@@ -157,69 +156,69 @@ def rejected_prefix(
     return None
 
 
-def _fair_core(
-    component: list[int],
-    successors: Successors,
-    label: Callable[[int], int],
-    fair: Sequence[Fair],
-    automaton: Automaton[A],
-    width: int,
-) -> set[int] | None:
-    """A strongly connected part in which every acceptance set is met and every fairness assumption can be met."""
-    work = [component]
-    while work:
-        part = work.pop()
-        members = set(part)
-        if len(part) == 1 and part[0] not in successors(part[0]):
-            continue
-        at = {product % width for product in part}
-        if not all(at & accepting for accepting in automaton.accepting):
-            continue
-        unfair = [
-            f
-            for f in fair
-            if any(label(p) & f.asking == f.asking for p in part)
-            and not any(label(p) & f.granting == f.granting for p in part)
+@dataclass(frozen=True, slots=True)
+class _Search(Generic[A]):
+    """The search for a lasso in the product of a graph and an automaton; a state of the product is a state of the graph
+    times the automaton's width, plus a node."""
+
+    successors: Successors
+    label: Callable[[int], int]
+    fair: Sequence[Fair]
+    automaton: Automaton[A]
+
+    @property
+    def width(self) -> int:
+        return len(self.automaton.positive)
+
+    def meets(self, product: int, wanted: int) -> bool:
+        return self.label(product) & wanted == wanted
+
+    def fair_core(self, component: list[int]) -> set[int] | None:
+        """A strongly connected part in which every acceptance set is met and every fairness assumption can be met."""
+        work, width = [component], self.width
+        while work:
+            part = work.pop()
+            members = set(part)
+            if len(part) == 1 and part[0] not in self.successors(part[0]):
+                continue
+            at = {product % width for product in part}
+            if not all(at & accepting for accepting in self.automaton.accepting):
+                continue
+            unfair = [
+                f
+                for f in self.fair
+                if any(self.meets(p, f.asking) for p in part) and not any(self.meets(p, f.granting) for p in part)
+            ]
+            if not unfair:
+                return members
+            rest = {p for p in part if not any(self.meets(p, f.asking) for f in unfair)}
+            work += strong_components(rest, self.within(rest))
+        return None
+
+    def within(self, part: Collection[int]) -> Successors:
+        return lambda product: [target for target in self.successors(product) if target in part]
+
+    def lasso(self, roots: Sequence[int], core: set[int]) -> Lasso:
+        """A short path to the core, then a cycle in it that meets everything that must be met."""
+        stem = _path(roots, core.__contains__, self.successors)
+        entry = stem[-1]
+        round_trip = [entry]
+        inside = self.within(core)
+        wanted: list[Callable[[int], bool]] = [
+            lambda p, accepting=accepting: p % self.width in accepting  # type: ignore[misc]
+            for accepting in self.automaton.accepting
         ]
-        if not unfair:
-            return members
-        rest = {p for p in part if not any(label(p) & f.asking == f.asking for f in unfair)}
-        work += strong_components(rest, lambda p, rest=rest: [t for t in successors(p) if t in rest])  # type: ignore[misc]
-    return None
-
-
-def _lasso(
-    roots: Sequence[int],
-    core: set[int],
-    successors: Successors,
-    label: Callable[[int], int],
-    fair: Sequence[Fair],
-    automaton: Automaton[A],
-    width: int,
-) -> Lasso:
-    """A short path to the core, then a cycle in it that meets everything that must be met."""
-    stem = _path(roots, core.__contains__, successors)
-    entry = stem[-1]
-    round_trip = [entry]
-
-    def inside(product: int) -> list[int]:
-        return [t for t in successors(product) if t in core]
-
-    wanted: list[Callable[[int], bool]] = [
-        lambda p, accepting=accepting: p % width in accepting  # type: ignore[misc]
-        for accepting in automaton.accepting
-    ]
-    wanted += [
-        lambda p, f=f: label(p) & f.granting == f.granting  # type: ignore[misc]
-        for f in fair
-        if any(label(p) & f.granting == f.granting for p in core)
-    ]
-    for meets in wanted:
-        if not any(map(meets, round_trip)):
-            round_trip += _path([round_trip[-1]], meets, inside)[1:]
-    back = _path(inside(round_trip[-1]), lambda p: p == entry, inside)
-    whole = stem[:-1] + round_trip + back[:-1]
-    return Lasso(tuple(p // width for p in whole), len(stem) - 1)
+        wanted += [
+            lambda p, f=f: self.meets(p, f.granting)  # type: ignore[misc]
+            for f in self.fair
+            if any(self.meets(p, f.granting) for p in core)
+        ]
+        for meets in wanted:
+            if not any(map(meets, round_trip)):
+                round_trip += _path([round_trip[-1]], meets, inside)[1:]
+        back = _path(inside(round_trip[-1]), lambda p: p == entry, inside)
+        whole = stem[:-1] + round_trip + back[:-1]
+        return Lasso(tuple(p // self.width for p in whole), len(stem) - 1)
 
 
 def _path(sources: Sequence[int], meets: Callable[[int], bool], successors: Successors) -> list[int]:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from avow.base import codec
@@ -210,33 +210,28 @@ def nodes(project: Project, outputs: frozenset[str] = frozenset()) -> Nodes:
     return Nodes(format_text(text, "fretish.rcl"), tuple(faults))
 
 
+@dataclass(slots=True)
 class _Node:
     """One component's ports and clauses."""
 
-    def __init__(
-        self,
-        component: str,
-        found: list[tuple[Requirement, Sentence]],
-        given: Mapping[str, Given],
-        outputs: frozenset[str],
-        constants: dict[str, str],
-        words: dict[str, str],
-        faults: list[Diagnostic],
-    ) -> None:
-        self.name = _word(component)
-        self.found = found
-        self.faults = faults
-        self.given = given
-        self.outputs = outputs or frozenset(name for _, s in found for name in _names(_answered(s.response)))
-        self.types: dict[str, str] = {}
-        self.same: list[tuple[str, str]] = []
-        self.ports: dict[str, str] = {}
-        """The names that clauses use, each with `in` or `out`."""
-        self.constants = constants
-        self.words = words
-        """RCL's names, each with FRET's. These two are shared by all nodes: outputs feed inputs of their name."""
-        self.scoped = False
-        self.within: tuple[str, ...] = ()
+    component: str
+    found: list[tuple[Requirement, Sentence]]
+    given: Mapping[str, Given]
+    outputs: frozenset[str]
+    """Those that the user names; empty: what the responses mention."""
+    constants: dict[str, str]
+    words: dict[str, str]
+    """RCL's names, each with FRET's. These two are shared by all nodes: outputs feed inputs of their name."""
+    faults: list[Diagnostic]
+    types: dict[str, str] = field(default_factory=dict)
+    same: list[tuple[str, str]] = field(default_factory=list)
+    ports: dict[str, str] = field(default_factory=dict)
+    """The names that clauses use, each with `in` or `out`."""
+    scoped: bool = False
+    within: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        self.outputs = self.outputs or frozenset(n for _, s in self.found for n in _names(_answered(s.response)))
 
     def text(self) -> str:
         for _, sentence in self.found:
@@ -280,7 +275,7 @@ class _Node:
             shown = ", ".join(f"{_word(n)} : {self._type(n)}" for n, of in sorted(self.ports.items()) if of == side)
             return f"( {shown} )" if shown else "()"
 
-        head = f"node {self.name} {{\n  inputs{listed('in')}\n  outputs{listed('out')}\n  topics()\n"
+        head = f"node {_word(self.component)} {{\n  inputs{listed('in')}\n  outputs{listed('out')}\n  topics()\n"
         return f"{head}{chr(10).join(clauses)}\n}}\n"
 
     def context(self) -> str:
