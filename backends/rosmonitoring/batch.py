@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from avow.evaluation.evaluate import NotEvaluable, evaluate
 from avow.formulas.values import FunctionValue, Value
 from avow.language.sorts import RealSort
 from avow.language.terms import Compare, In, SequenceRange, SetTerm, Term, Variable
@@ -22,7 +23,6 @@ from avow.ros.bags import ENVELOPE, Channel, Event
 from avow.ros.definitions import FLOATS, Scalar
 from avow.ros.layout import Layout
 
-from .notes import number_of
 from .options import same_topic
 from .reading import Reader, at
 from .rules import Choice, FieldPath, Fields, Hold, Rule, paths_of
@@ -375,14 +375,23 @@ def _compared(term: Term, variable: Variable) -> Iterator[Fraction | None]:
             if term.qualified == variable.qualified:
                 yield None
         case Compare(left=left, right=right) if _is(left, variable) or _is(right, variable):
-            yield number_of(right if _is(left, variable) else left)
+            yield _number_of(right if _is(left, variable) else left)
         case In(item=item, collection=SetTerm(items=items)) if _is(item, variable):
-            yield from map(number_of, items)
+            yield from map(_number_of, items)
         case In(item=item, collection=SequenceRange(low=low, high=high)) if _is(item, variable):
-            yield from (number_of(low), number_of(high))
+            yield from (_number_of(low), _number_of(high))
         case _:  # no comparison itself
             for child in term.children:
                 yield from _compared(child, variable)
+
+
+def _number_of(term: Term) -> Fraction | None:
+    """The value of a term without variables; None if it is not a number."""
+    try:
+        value = evaluate(term, {})
+    except NotEvaluable:
+        return None
+    return Fraction(value) if isinstance(value, int | Fraction) and not isinstance(value, bool) else None
 
 
 def _is(term: Term, variable: Variable) -> bool:

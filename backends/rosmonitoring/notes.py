@@ -1,31 +1,24 @@
-"""The notes on a monitor before it runs: the field that each variable is read from, numbers that no message can hold,
-and bags whose messages differ from the expected types."""
+"""The notes on a monitor before it runs: the field that each variable is read from, and bags whose messages differ from
+the expected types."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from fractions import Fraction
 from pathlib import Path
 from typing import assert_never
 
 from avow.base.diagnostics import Diagnostic, Severity, Span
 from avow.base.graphs import reached
-from avow.evaluation.evaluate import NotEvaluable, evaluate
 from avow.formulas.formula import free_variables
-from avow.formulas.values import show
-from avow.language.contract import Clause
-from avow.language.sorts import RealSort
-from avow.language.subterms import subterms
-from avow.language.terms import Compare, Role, Term, Variable, Widen
+from avow.language.terms import Role
 from avow.ros.bags import Carried, Origin, is_bag
 from avow.ros.calls import is_service_part
-from avow.ros.definitions import FLOATS, Definitions, Message, Scalar, canonical
+from avow.ros.definitions import Definitions, Message, canonical
 
 from .options import Setup, same_topic
 from .reading import shown
 from .rules import Choice, Constant, Fields, Previous, Rule
 from .traces import carried
-from .wires import of_type
 
 
 def readable(setup: Setup, path: Path, where: Origin) -> tuple[Diagnostic, ...]:
@@ -114,46 +107,3 @@ def reading(name: str, rule: Rule) -> str:
             return ""
         case _:
             assert_never(rule)
-
-
-def unholdable(setup: Setup, clause: Clause) -> Iterator[Diagnostic]:
-    """A warning for each number that a variable is compared with (==, !=) and that its type cannot represent."""
-    for term in subterms(clause.formula):
-        if not isinstance(term, Compare) or term.operator not in ("==", "!="):
-            continue
-        for one, other in ((term.left, term.right), (term.right, term.left)):
-            variable, number = _bare(one), number_of(other)
-            if isinstance(variable, Variable) and number is not None:
-                yield from _unholdable(setup, clause, variable, number)
-
-
-def _unholdable(setup: Setup, clause: Clause, variable: Variable, number: Fraction) -> Iterator[Diagnostic]:
-    rule = setup.rules.get(variable.qualified)
-    if not isinstance(rule, Fields) or not isinstance(variable.sort, RealSort) or rule.take is not None:
-        return
-    wire = rule.wire(0)
-    if not isinstance(wire, Scalar) or wire.name not in FLOATS:
-        return
-    try:
-        near = of_type(number, wire)
-    except OverflowError:
-        near = Fraction(0)
-    if near != number:
-        message = (
-            f"{clause.name} asks whether {variable.qualified} is {show(number)}, which no {wire} is: the nearest one "
-            f"is another number, so the answer is always no"
-        )
-        yield Diagnostic("MON106", message, clause.span, Severity.WARNING, hint="ask for a range")
-
-
-def number_of(term: Term) -> Fraction | None:
-    """The value of a term without variables; None if it is not a number."""
-    try:
-        value = evaluate(term, {})
-    except NotEvaluable:
-        return None
-    return Fraction(value) if isinstance(value, int | Fraction) and not isinstance(value, bool) else None
-
-
-def _bare(term: Term) -> Term:
-    return term.term if isinstance(term, Widen) else term
