@@ -60,18 +60,16 @@ def choice_cases(rule: Choice, sort: DataSort, stem: str) -> list[Case]:
         if not words:
             continue
         tag = (rule.tag, " | ".join(words))
-        places = rule.arguments[constructor.name]
-        paths: list[FieldPath] = []
-        for place in places:
-            if isinstance(place, Lookup):
-                raise NotRml(f"an argument of {constructor.name} is looked up in a table")
-            paths.append(place)
+        sources = rule.arguments[constructor.name]
+        paths = [source for source in sources if not isinstance(source, Lookup)]
+        if len(paths) < len(sources):
+            raise NotRml(f"an argument of {constructor.name} is looked up in a table")
         binds = binds_of(stem, paths)
         per_field = [
             field_cases(path, s, bind, {}) for path, s, bind in zip(paths, constructor.parameters, binds, strict=True)
         ]
-        for parts in product(*per_field):
-            whole = together((), parts)
+        for chosen in product(*per_field):
+            whole = together((), chosen)
             values = made(sort, constructor.name, [whole.values])
             found.append(Case((tag, *whole.fields), values, whole.binds, whole.guard))
     return found
@@ -99,12 +97,12 @@ def field_cases(path: FieldPath, sort: Sort, name: str, names: Mapping[str, str]
     """A field's content: a constant for each element of an enumeration, else a variable."""
     match sort:
         case EnumSort(members=members):
-            found = []
-            for member in members:
-                words = _words(member, names)
-                if words:
-                    found.append(Case(((path, " | ".join(words)),), (literal(code(sort, member)),), ()))
-            return found
+            meanings = ((member, _words(member, names)) for member in members)
+            return [
+                Case(((path, " | ".join(words)),), (literal(code(sort, member)),), ())
+                for member, words in meanings
+                if words
+            ]
         case BoolSort():
             return [Case(((path, word),), (literal(number),), ()) for word, number in (("false", 0), ("true", 1))]
         case NaturalSort():

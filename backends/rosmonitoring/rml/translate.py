@@ -20,7 +20,7 @@ from avow.evaluation.evaluate import free_names
 from avow.formulas.values import Value
 from avow.language import terms as t
 from avow.language.contract import Clause
-from avow.language.sorts import DataSort, RealSort, Sort, StringSort
+from avow.language.sorts import DataSort, RealSort, StringSort
 from avow.language.terms import Role
 from avow.ros.calls import is_part
 
@@ -289,15 +289,15 @@ class _Machine:
         values: dict[str, rml.Numeric] = dict.fromkeys(state, rml.ZERO)
         for name, rule in self.rules.items():
             first = None if isinstance(rule, Constant) else self._first(rule)
-            if first is not None:
-                symbol, sort = self.symbols[name], rule.variable.sort
-                if isinstance(symbol, sym.Tracked):
-                    values.update(_seen_at_start(symbol, first, sort))
-                else:
-                    known = sym.constant(first, sort)
-                    if not (parts := sym.parts(known)) and known != sym.Points(()):
-                        raise rml.NotRml("an initial value with more than one tuple")
-                    values.update(zip(sym.components(symbol), parts, strict=bool(parts)))
+            if first is None:
+                continue
+            symbol, known = self.symbols[name], sym.constant(first, rule.variable.sort)
+            if isinstance(symbol, sym.Tracked):
+                values.update(_seen_at_start(symbol, known))
+                continue
+            if not (parts := sym.parts(known)) and known != sym.Points(()):
+                raise rml.NotRml("an initial value with more than one tuple")
+            values.update(zip(sym.components(symbol), parts, strict=bool(parts)))
         return [values[name] for name in state]
 
     def _drafts(
@@ -402,8 +402,7 @@ def _calculated(operator: str, left: rml.Numeric, right: rml.Numeric) -> rml.Num
             return rml.calculation(operator, left, right)
 
 
-def _seen_at_start(symbol: sym.Tracked, first: Value, sort: Sort) -> dict[str, rml.Numeric]:
-    known = sym.constant(first, sort)
+def _seen_at_start(symbol: sym.Tracked, known: sym.Symbol) -> dict[str, rml.Numeric]:
     assert isinstance(known, sym.Points)
     seen = {tuple(n.value for n in chain(*parts) if isinstance(n, t.Literal)) for _, parts in known.tuples}
     return {flag: rml.literal(at in seen) for at, flag in symbol.flags.items()}
