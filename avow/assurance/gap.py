@@ -183,7 +183,8 @@ def suggest(view: ObligationView, demand: Demand | None, facts: Facts) -> Sugges
             text = f"repair what the counterexample of {short(view.id)} shows{accept}"
             return Suggestion(known or text, cost=-2)  # what is wrong comes before what is lacking
         case Status.CONTRADICTORY:
-            return Suggestion(f"{short(view.id)}: {_two_answers(view)}", cost=-2)
+            text = "one method proves it and another refutes it; repair what is wrong, or find out which tool is"
+            return Suggestion(f"{short(view.id)}: {text}", cost=-2)
         case Status.ERROR:
             # the same job is not run again by itself: its input has to change, or the run be fresh
             again = f"`avow verify --fresh {facts.system}`"
@@ -245,25 +246,6 @@ def suggest(view: ObligationView, demand: Demand | None, facts: Facts) -> Sugges
 
 def _clipped(text: str) -> str:
     return text if len(text) <= TOOL_WORDS else f"{text[:TOOL_WORDS].rpartition(' ')[0]} …"
-
-
-def _two_answers(view: ObligationView) -> str:
-    """Two opposite answers about one object cannot both be right; a model and a recording of the robot may well
-    differ."""
-    records = view.records
-    for proof in (r for r in records if effective(r) is Verdict.PROVED):
-        for refutation in (r for r in records if r.verdict is Verdict.REFUTED):
-            read, other = set(proof.inputs), set(refutation.inputs)
-            if read and other and not read & other:
-                proved = f"`{proof.method}` proves it of {_files(read)}"
-                refuted = f"`{refutation.method}` refutes it of {_files(other)}"
-                return f"{proved} and {refuted}: repair what the counterexample shows, or find out which tool is wrong"
-    return "find out which tool is wrong: one proves the claim and another refutes it"
-
-
-def _files(paths: set[str]) -> str:
-    names = sorted(path.rpartition("/")[2] for path in paths)
-    return ", ".join(names[:2]) + (", …" if len(names) > 2 else "")
 
 
 def _expired(view: ObligationView) -> tuple[str, ...]:

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
+from dataclasses import fields, is_dataclass, replace
 from importlib import resources
 from itertools import chain
 from typing import Any
 
 from avow.assurance.answers import Assumption, SupposedLine
 from avow.assurance.changes import baseline_of
-from avow.assurance.model import Case, ObligationView, SourceView
+from avow.assurance.model import Case, ObligationView, RequirementView, SourceView
 from avow.assurance.naming import short
 from avow.backend_kit.timeline import in_words, picture, timelines
 from avow.base.diagnostics import Diagnostic, Rejected
@@ -24,7 +26,6 @@ from avow.report.modules import RequirementModule, requirement_modules
 from avow.report.page import by_node
 from avow.report.source import plain_lines
 from avow.report.wording import (
-    MARKS,
     NO_HAZARD,
     NOT_SHOWN,
     bound_text,
@@ -38,9 +39,6 @@ from avow.report.wording import (
     weakest,
     worth,
 )
-
-_GATES = {"passes": "good", "fails": "bad", "not asked": "plain"}
-"""The colour of each gate state."""
 
 
 def render_pdf(case: Case) -> bytes:
@@ -66,74 +64,44 @@ def render_pdf(case: Case) -> bytes:
 
 
 def _data(case: Case) -> dict[str, Any]:
+    """What `report.typ` lays out: views of the case as they are, and what it cannot compute."""
     views = list(chain.from_iterable(by_node(case).values()))[:PDF_OBLIGATIONS]
     levels = {node.name: node.criticality for node in case.nodes}
-    nodes = dict.fromkeys(v.obligation.node for v in views if v.obligation.kind is Kind.GUARANTEE)
     facts = [
         ("system", case.system),
         ("proofs", f"{case.grade.word}: {case.grade_reason}"),
         ("policy", case.policy.name),
+        ("date", case.today),
+        ("run", case.run.id),
+        ("ledger", case.ledger_head),
     ]
-    facts += [("date", case.today), ("run", case.run.id), ("ledger", case.ledger_head)]
     left_out = len(case.obligations) - len(views)
     more = [f"{left_out} obligations are left out of this document: see report.json."] if left_out else []
+    items = [i for i in case.open_items[:PDF_OBLIGATIONS] if not i.advice]
     found: dict[str, Any] = {
         "title": case.title,
+        "today": case.today,
         "proofs": f"proofs {case.grade.word}",
         "facts": [*facts, *case.digests],
+        "answers": case.answers,
         "first": _first(case),
+        "tones": {status.value: tone(status) for status in Status},
         "assumptions": [_assumption(s) for s in case.assumptions],
         "deficits": [[str(w.count), w.words, w.why, by_claim(w)] for w in case.deficits],
         "modules": [_module(module) for module in requirement_modules(case)],
         "hazards": hazard_rows(case),
         "no_hazard": NO_HAZARD,
-        "gates": [
-            {"title": g.title, "reason": g.reason, "status": {"word": g.state, "tone": _GATES.get(g.state, "plain")}}
-            for g in case.gates
-        ],
-        "open": [
-            {
-                "claim": short(i.claim),
-                "title": i.title,
-                "reason": i.reason,
-                "text": i.text,
-                "next": i.suggestion,
-                "status": _word(i.kind),
-            }
-            for i in case.open_items[:PDF_OBLIGATIONS]
-            if not i.advice
-        ],
+        "gates": case.gates,
+        "open": [replace(item, claim=short(item.claim)) for item in items],
         "remarks": [f"{i.title or short(i.claim)} ({i.text})" for i in case.open_items if i.advice][:PDF_OBLIGATIONS],
-        "matrix": [
-            {
-                "name": node,
-                "criticality": f"{levels.get(node, '')} criticality",
-                "rows": [_row(v) for v in views if v.obligation.node == node and v.obligation.kind is Kind.GUARANTEE],
-            }
-            for node in nodes
-        ],
-        "derivations": [
-            {
-                "name": d.derivation.name,
-                "rule": d.derivation.rule,
-                "text": d.derivation.text,
-                "conclusion": d.derivation.conclusion,
-                "conditions": "; ".join(c.text for c in d.derivation.side_conditions),
-                "status": _chip(d.status),
-            }
-            for d in case.derivations
-        ],
-        "obligations": [_obligation(case, view) for view in views],
-        "environment": [(e.port, e.assume or "nothing is assumed", e.because) for e in case.environment],
-        "findings": [
-            f"{f.how}: {f.pattern} {f.verdict}. {f.reason} {f.who} {f.date}".strip()
-            + (" (expired)" if f.expired else "")
-            for f in case.findings
-        ],
+        "derivations": case.derivations,
+        "obligations": [_obligation(case, view, levels) for view in views],
+        "environment": case.environment,
+        "findings": case.findings,
         "not_shown": [*more, *NOT_SHOWN],
         "sources": [_source(source) for source in case.sources if source.is_contract],
     }
-    plain: dict[str, Any] = _clean(found)
+    plain: dict[str, Any] = _plain(found)
     return plain
 
 
@@ -148,47 +116,18 @@ def _source(source: SourceView) -> dict[str, Any]:
 
 
 def _first(case: Case) -> dict[str, Any]:
-    """The first sheet: the content of the page's first screen."""
-    a = case.answers
-    many = len(case.listed) < len(case.requirements)
+    """For the first sheet, which has the content of the page's first screen."""
+    a, many = case.answers, len(case.listed) < len(case.requirements)
+    rows = [(r.id, r.words, _toned(r), weakest(r), str(len(r.supposes)), r.noted) for r in case.listed]
+    levels = [(f"{n} {one}", ", ".join(r.id for r in case.requirements if r.level is one)) for one, n in a.by_level]
     return {
-        "kicker": f"{case.today} · {a.signed}",
-        "verdict": f"{a.tone.mark} {a.verdict}",
-        "tone": a.tone.value,
-        "counts": a.beside,
-        "fails": f"Fails: {'; '.join(f.title for f in a.failures)}." if a.failures else "",
+        "mark": a.tone.mark,
         "hazards": "; ".join(f"{tone.mark} mitigation {level}: {names}" for tone, level, names in dangers(case)),
-        "by_level": [
-            [f"{number} {level}", ", ".join(r.id for r in case.requirements if r.level is level)]
-            for level, number in a.by_level
-        ]
-        if many
-        else [],
-        "listed": [
-            [
-                r.id,
-                r.words,
-                {"word": f"{r.tone.mark} {r.level}", "tone": r.tone.value},
-                weakest(r),
-                str(len(r.supposes)),
-                r.noted,
-            ]
-            for r in case.listed
-        ],
-        "legend": f"{a.legend}." if a.legend else "",
-        "based_on": [[b.title, [[letter, tone.value] for letter, tone in b.squares], b.words] for b in a.based_on],
-        "more_nodes": a.more_nodes,
-        "objects": f"{a.objects}." if a.objects else "",
+        "by_level": levels if many else [],
+        "listed": rows,
         "weakest": a.refuted or _weakest(case),
         "deficits": [f"{w.count} {w.words}" for w in case.deficits] or ["No deficit is known."],
-        "trusted": [f"{t.what[:1].upper()}{t.what[1:]} ({t.which}): {t.mitigation}." for t in a.trusted],
-        "next": f"Next weakest: {a.next_weakest}." if a.next_weakest and not a.refuted else "",
-        "supposed": [[line.about, *_supposed(case, line)] for line in a.supposed],
-        "owned": _owned(case),
-        "changed_against": a.changed_against,
-        "changed": [f"{mark} {words}".strip() for mark, words in a.changed],
-        "statement": a.statement,
-        "signed": a.signed if a.signed.startswith("signed") else "",
+        "supposed": [(line.about, *_supposed(case, line)) for line in a.supposed],
         "content": f"What is signed has the digest {baseline_of(case).content[:16]}…",
     }
 
@@ -201,17 +140,16 @@ def _supposed(case: Case, line: SupposedLine) -> tuple[str, str]:
     return "; ".join((first, *(f"{s.number} {s.words}" for s in others(case, line)))), ""
 
 
-def _owned(case: Case) -> str:
-    a = case.answers
-    return f"{a.owned} with an owner and an end{a.owners and ': '}{a.owners}." if a.owned else "Nothing."
-
-
 def _weakest(case: Case) -> str:
     found = case.answers.weakest
     if found is None:
         return "There is no evidence."
     rests = f" On it rest {listed(found.needed_by)}{found.others}." if found.needed_by else ""
     return f"{found.title}: “{found.quote}”. {found.words[:1].upper()}{found.words[1:]}.{rests}"
+
+
+def _toned(requirement: RequirementView) -> dict[str, str]:
+    return {"word": f"{requirement.tone.mark} {requirement.level}", "tone": requirement.tone.value}
 
 
 def _assumption(assumption: Assumption) -> list[str]:
@@ -229,7 +167,7 @@ def _module(module: RequirementModule) -> dict[str, Any]:
         "id": r.id,
         "text": r.words,
         "formula": in_lines(r.formal),
-        "status": {"word": f"{r.tone.mark} {r.level}", "tone": r.tone.value},
+        "status": _toned(r),
         "because": module.because,
         "strategy": module.strategy,
         "lines": lines,
@@ -237,18 +175,20 @@ def _module(module: RequirementModule) -> dict[str, Any]:
     }
 
 
-def _obligation(case: Case, view: ObligationView) -> dict[str, Any]:
-    said = case.said(view.id)
+def _obligation(case: Case, view: ObligationView, levels: Mapping[str, str]) -> dict[str, Any]:
+    said, o = case.said(view.id), view.obligation
     return {
         "name": short(view.id),
-        "node": "the whole system" if view.obligation.node == SYSTEM_LEVEL else view.obligation.node,
-        "claim": view.obligation.claim,
-        "formula": in_lines(view.obligation.formula),
+        "own": o.name if o.kind is Kind.GUARANTEE else "",
+        "node": "the whole system" if o.node == SYSTEM_LEVEL else o.node,
+        "criticality": f"{levels.get(o.node, '')} criticality",
+        "claim": o.claim,
+        "formula": in_lines(o.formula),
         "reason": f"{said.how.capitalize()}: {said.reason}" if said and said.reason else "",
-        "status": _chip(view.standing),
+        "status": view.standing,
         "evidence": [
             {
-                "status": _chip(worth(e)),
+                "status": worth(e),
                 "method": e.method,
                 "tool": e.tool_told,
                 "summary": f"{e.summary}. How it was measured: {protocol(e)}" if protocol(e) else e.summary,
@@ -278,26 +218,17 @@ def _counter(shown: Counterexample) -> dict[str, Any]:
     }
 
 
-def _row(view: ObligationView) -> dict[str, Any]:
-    methods = [{"word": f"{record.method}: {worth(record)}", "tone": tone(worth(record))} for record in view.records]
-    return {"name": view.obligation.name, "status": _chip(view.standing), "methods": methods}
-
-
-def _chip(status: Status) -> dict[str, str]:
-    return {"word": status.value, "tone": tone(status)}
-
-
-def _word(kind: str) -> dict[str, str]:
-    return _chip(Status(kind)) if kind in MARKS else {"word": kind, "tone": "bad"}
-
-
-def _clean(value: Any) -> Any:
+def _plain(value: Any) -> Any:
+    """Views as plain data, with what their properties say; texts without characters that XML cannot hold."""
     match value:
         case str():
             return clean(value)
-        case dict():
-            return {key: _clean(item) for key, item in value.items()}
+        case Mapping():
+            return {key: _plain(item) for key, item in value.items()}
         case list() | tuple():
-            return [_clean(item) for item in value]
+            return list(map(_plain, value))
+        case _ if is_dataclass(value):
+            said = [name for name, part in vars(type(value)).items() if isinstance(part, property)]
+            return {name: _plain(getattr(value, name)) for name in (*(f.name for f in fields(value)), *said)}
         case _:  # a number, a Boolean or None
             return value

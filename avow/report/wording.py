@@ -187,59 +187,26 @@ _CONNECTIVES = ("→↔⇒⇔", "∨", "∧")
 """Weakest first."""
 
 
-def in_lines(formula: str) -> str:
+def in_lines(formula: str, margin: str = "") -> str:
     """A long formula broken before its connectives, the weakest outermost; only blanks are changed."""
-    if "\n" in formula:
-        return formula
-    lines: list[str] = []
-    stack = [(0, formula)]
-    while stack:
-        margin, text = stack.pop()
-        parts = _split(text) if len(text) + margin > FORMULA_COLUMNS and margin <= 32 else []
-        if parts:
-            stack += [(margin + indent, part) for indent, part in reversed(parts)]
-        else:
-            lines.append(" " * margin + text)
-    return "\n".join(lines)
+    if len(margin + formula) <= FORMULA_COLUMNS or "\n" in formula:
+        return margin + formula
+    for kind in _CONNECTIVES:
+        first, *rest = _parts(formula, kind)
+        if rest:
+            return "\n".join([in_lines(first, margin), *(in_lines(part, f"{margin}  ") for part in rest)])
+    return margin + formula
 
 
-def _split(text: str) -> list[tuple[int, str]]:
-    """The parts with their indentation: cut before the weakest connectives outside parentheses, else after a
-    quantifier's dot; if there is neither, within the outermost parentheses that have one. Empty if none have."""
-    for depth in range(4):
-        inner = 2 if depth or text[0] in "∧∨→↔⇒⇔" else 0
-        cuts, kind = _cuts(text, depth)
-        if not cuts:
-            continue
-        ends = [*cuts[1:], len(text)]
-        head, rest = text[: cuts[0]].rstrip(), [text[a:b].rstrip() for a, b in zip(cuts, ends, strict=True)]
-        if kind == "·":
-            return [(0, head), *((2, part) for part in rest)]
-        if kind == _CONNECTIVES[0] and not inner:
-            return [(2, head), *((0, part) for part in rest)]
-        return [(0, head), *((inner, part) for part in rest)]
-    return []
-
-
-def _cuts(text: str, wanted: int) -> tuple[list[int], str]:
-    """Where to cut at one depth of parentheses, and at what: text after a dot is within its quantifier's scope."""
-    found: dict[str, list[int]] = {}
-    depth = 0
+def _parts(text: str, kind: str) -> list[str]:
+    """The text cut before the connectives of a kind that are outside parentheses."""
+    parts, depth, start = [], 0, 0
     for at, c in enumerate(text):
-        if c in "([{":
-            depth += 1
-        elif c in ")]}":
-            depth -= 1
-        elif depth == wanted and c == " " and at > 2:
-            if text[at - 1] == "·":
-                if not found:
-                    return [at + 1], "·"
-                break
-            kind = next((k for k in _CONNECTIVES if text[at + 1 : at + 2] in k and text[at + 2 : at + 3] == " "), None)
-            if kind:
-                found.setdefault(kind, []).append(at + 1)
-    weakest = next((kind for kind in _CONNECTIVES if kind in found), "")
-    return found.get(weakest, []), weakest
+        depth += (c in "([{") - (c in ")]}")
+        if depth == 0 and c in kind and at > start + 1 and text[at - 1] == text[at + 1 : at + 2] == " ":
+            parts.append(text[start:at].rstrip())
+            start = at
+    return [*parts, text[start:]]
 
 
 def bound_text(bound: Mapping[str, Any]) -> str:

@@ -57,7 +57,7 @@ def _budgets(wide: dict[str, Any]) -> list[str]:
 def counts(found: Case, page: str) -> list[str]:
     """Page, Markdown, terminal, comment and PDF say the same, and each assumption in full once."""
     a, told = found.answers, []
-    pdf = pdf_data(found)["first"]
+    pdf = pdf_data(found)["answers"]
     plain = re.sub(r"\s+", " ", re.sub(r"<[^>]*>", "", page))
     markdown = render_markdown(found).replace("\\", "")
     terminal = terminal_lines(found)
@@ -66,7 +66,7 @@ def counts(found: Case, page: str) -> list[str]:
         ("Markdown", markdown),
         ("terminal", " ".join(" ".join(terminal).split())),
         ("comment", comment(found).replace("\\", "")),
-        ("PDF", f"{pdf['verdict']} {pdf['counts']}"),
+        ("PDF", f"{pdf['verdict']} {pdf['beside']}"),
     ):
         told += [f"{name} lacks {part!r}" for part in (a.verdict, *a.beside.split(" · ")) if part not in text]
     told += words(found)

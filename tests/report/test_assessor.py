@@ -50,8 +50,8 @@ def test_a_vacuous_pass_is_called_so_in_every_format() -> None:
         "vacuous",
         "checked",
     ]
-    assert "hoare: vacuous" in made["pdf"]
-    assert '"hoare: proved"' not in made["pdf"]
+    assert '"status": "vacuous", "method": "hoare"' in made["pdf"]
+    assert '"status": "proved", "method": "hoare"' not in made["pdf"]
     assert not re.search(r'class="(chip|mini) good"[^>]*>(<span[^>]*>✔</span>)? *proved', made["traceability.html"])
     body = made["node-agent.html"].split('id="list"')[1].split("</section>")[0]
     assert "the tool said: proved" in body
@@ -62,8 +62,8 @@ def test_a_record_that_claims_more_than_its_method_can_is_told_at_its_worth() ->
     found = case(SUBJECT, [G1, G2], [evidence(G1, Verdict.PROVED, "hypothesis"), evidence(G2, method="ajpf")])
     made = texts(found)
     assert "hypothesis tested" in made["report.md"]
-    assert "hypothesis: tested" in made["pdf"]
-    assert "hypothesis: proved" not in made["pdf"]
+    assert '"status": "tested", "method": "hypothesis"' in made["pdf"]
+    assert '"status": "proved", "method": "hypothesis"' not in made["pdf"]
 
 
 def test_a_method_that_failed_is_an_open_item_though_another_decides() -> None:

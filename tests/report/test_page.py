@@ -237,8 +237,9 @@ def test_a_long_formula_is_broken_where_its_structure_is() -> None:
         "∃ k ∈ ℕ · in.wayP(x, y, k) ∧ out.command = move(x, y)"
     )
     assert wording.in_lines(text).splitlines() == [
-        "∀ x, y ∈ ℝ, i ∈ ℕ ·",
-        "    in.at(x, y) ∧ in.wayP(x, y, i) ∧ (in.level ∉ {red, orange} ∨ in.known(i))",
+        "∀ x, y ∈ ℝ, i ∈ ℕ · in.at(x, y)",
+        "  ∧ in.wayP(x, y, i)",
+        "  ∧ (in.level ∉ {red, orange} ∨ in.known(i))",
         "  → ∃ k ∈ ℕ · in.wayP(x, y, k) ∧ out.command = move(x, y)",
     ]
 
