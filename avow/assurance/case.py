@@ -324,8 +324,7 @@ def _views(
 
 
 def _view(entry: Entry, found: Currency) -> EvidenceView:
-    cut = effective(entry.evidence)
-    return EvidenceView(entry, found, found is Currency.CURRENT, cut if cut is not entry.evidence.verdict else None)
+    return EvidenceView(entry, found, found is Currency.CURRENT)
 
 
 def _failed(entry: Entry) -> bool:

@@ -120,8 +120,6 @@ class EvidenceView:
     currency: Currency
     counts: bool
     """Whether it contributes to the claim's status: exactly if it is current."""
-    cut_to: Verdict | None = None
-    """Set if the record claims more than its method can show: the verdict that counts instead."""
 
 
 @dataclass(frozen=True, slots=True)

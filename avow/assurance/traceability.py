@@ -8,33 +8,13 @@ from __future__ import annotations
 import csv
 import io
 from collections.abc import Iterable
-from dataclasses import astuple, replace
+from dataclasses import astuple, fields, replace
 
 from avow.assurance.model import Case, ObligationView
 from avow.assurance.naming import derivation_claim, requirement_claim, rerun, short
 from avow.base.records import dataclass
 from avow.evidence.obligation import Kind
 from avow.evidence.status import Status, weigh
-
-COLUMNS = (
-    "source",
-    "hazards",
-    "requirement",
-    "requirement status",
-    "derived property",
-    "guarantee",
-    "obligation",
-    "obligation status",
-    "method",
-    "verdict",
-    "link",
-    "tool",
-    "evidence",
-    "tool output",
-    "SHA-256",
-    "re-run",
-    "remark",
-)
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,6 +38,18 @@ class Row:
     digest: str = ""
     rerun: str = ""
     remark: str = ""
+
+
+_HEADS = {
+    "level": "requirement status",
+    "derivation": "derived property",
+    "status": "obligation status",
+    "output": "tool output",
+    "digest": "SHA-256",
+    "rerun": "re-run",
+}
+COLUMNS = tuple(_HEADS.get(part.name, part.name) for part in fields(Row))
+"""The head of the CSV."""
 
 
 def trace(case: Case) -> tuple[Row, ...]:

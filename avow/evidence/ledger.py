@@ -115,11 +115,6 @@ class Ledger:
         entries = self.records()
         return entries[-1].hash if entries else GENESIS
 
-    def latest(self, obligation: str, method: str) -> Entry | None:
-        """The newest attempt of a method at an obligation, current or not."""
-        found = [e for e in self.records() if (e.evidence.obligation, e.evidence.method) == (obligation, method)]
-        return found[-1] if found else None
-
     def current(self, obligation: str, key: str) -> tuple[Entry, ...]:
         """All attempts at an obligation that have the current `key`, oldest first."""
         with self._lock:

@@ -11,6 +11,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import field, replace
 from enum import StrEnum
+from typing import Any
 
 from avow.assurance.certification import ProofGrade
 from avow.assurance.model import Case, EvidenceView, ObligationView
@@ -124,6 +125,10 @@ class _Argument:
         self.last[sort] += 1
         return f"{sort}{self.last[sort]}"
 
+    def made(self, sort: Sort, text: str, below: tuple[str, ...] = (), **more: Any) -> Element:
+        """An element with a name of its own."""
+        return Element(self.new(sort), sort, text, below, **more)
+
     def modules(self) -> Iterator[Module]:
         asked = (self.validation(), self.composition(), self.models(), self.contracts(), self.tools())
         general = [module for module in asked if module]
@@ -138,17 +143,17 @@ class _Argument:
 
     def whole(self, others: Sequence[Module]) -> Module:
         case = self.case
-        context = Element(self.new(Sort.CONTEXT), Sort.CONTEXT, f"Policy {case.policy.name}: {case.policy.title}")
+        context = self.made(Sort.CONTEXT, f"Policy {case.policy.name}: {case.policy.title}")
         assumptions = [
             Element(a.number, Sort.ASSUMPTION, a.words, label=f"{a.number} ({a.sort})") for a in case.assumptions
         ]
         strategies = []
         if self.requirements:
             text, below = "Argument over each requirement", tuple(self.requirements.values())
-            strategies.append(Element(self.new(Sort.STRATEGY), Sort.STRATEGY, text, below))
+            strategies.append(self.made(Sort.STRATEGY, text, below))
         if others:
             text, below = "Argument over what the evidence takes for granted", tuple(m.elements[0].name for m in others)
-            strategies.append(Element(self.new(Sort.STRATEGY), Sort.STRATEGY, text, below))
+            strategies.append(self.made(Sort.STRATEGY, text, below))
         given = f", given assumptions A1 to A{len(assumptions)}" if assumptions else ""
         proposition = f"{case.title} meets {count(len(self.requirements), 'requirement')}{given}"
         top = Element(
@@ -167,12 +172,12 @@ class _Argument:
         r = module.requirement
         context = []
         if r.formal:
-            context.append(Element(self.new(Sort.CONTEXT), Sort.CONTEXT, r.formal, label="Formula"))
+            context.append(self.made(Sort.CONTEXT, r.formal, label="Formula"))
         if r.source:
-            context.append(Element(self.new(Sort.CONTEXT), Sort.CONTEXT, r.source, label="Source"))
+            context.append(self.made(Sort.CONTEXT, r.source, label="Source"))
         solutions = [s for name in r.obligations if name in self.views for s in self.solutions(self.views[name])]
         below = tuple(self.goals[name] for name in r.closure if name in self.goals)
-        strategy = Element(self.new(Sort.STRATEGY), Sort.STRATEGY, module.strategy, below)
+        strategy = self.made(Sort.STRATEGY, module.strategy, below)
         supported = (*([strategy.name] if below else []), *(s.name for s in solutions))
         goal = Element(
             self.requirements[r.id],
@@ -208,8 +213,7 @@ class _Argument:
                 artifact = Artifact(digest, r.validation.date, r.validation.who, "", ())
                 open_doubt = Defeater("the reader misread the sentence", "")
                 solutions.append(
-                    Element(
-                        self.new(Sort.SOLUTION),
+                    self.made(
                         Sort.SOLUTION,
                         said,
                         label=r.validation.date,
@@ -232,7 +236,7 @@ class _Argument:
         for node in sorted(of_models - {v.obligation.node for v in linked}):
             text = f"The model of {node} that was verified behaves as its program"
             label = f"{node} [{Status.MISSING}]"
-            goals.append(Element(self.new(Sort.GOAL), Sort.GOAL, text, undeveloped=True, unsupported=True, label=label))
+            goals.append(self.made(Sort.GOAL, text, undeveloped=True, unsupported=True, label=label))
         whole = all(self.linked(v, r) for v in self.case.guarantees for r in v.records if r.of is Object.MODEL)
         text = "Each model that was verified behaves as the program that runs"
         return self.general("model-fidelity", text, [*goals, *solutions], whole, goals)
@@ -258,8 +262,7 @@ class _Argument:
     def tools(self) -> Module:
         """Whether the tools answer correctly: the mitigation for each part that has to be trusted."""
         solutions = [
-            Element(
-                self.new(Sort.SOLUTION),
+            self.made(
                 Sort.SOLUTION,
                 f"{line.what} ({line.which}): {line.mitigation}",
                 believed="it belongs to what has to be trusted",
@@ -283,8 +286,7 @@ class _Argument:
                     others.append(Element(below[-1], Sort.GOAL, m.words, undeveloped=True, label=label))
             hazard = view.hazard
             goals.append(
-                Element(
-                    self.new(Sort.GOAL),
+                self.made(
                     Sort.GOAL,
                     f"The hazard “{hazard.text}” is mitigated",
                     tuple(dict.fromkeys(below)),
@@ -308,7 +310,7 @@ class _Argument:
     ) -> Module:
         """`whole`: whether everything below the goal is shown. `goals`: the elements directly below it, if not all."""
         below = tuple(element.name for element in (elements if goals is None else goals))
-        root = Element(self.new(Sort.GOAL), Sort.GOAL, text, below, undeveloped=not below, unsupported=not whole)
+        root = self.made(Sort.GOAL, text, below, undeveloped=not below, unsupported=not whole)
         label = "" if whole else "partly shown" if below else "not shown"
         return Module(name, text, (replace(root, label=label), *elements))
 
@@ -346,8 +348,7 @@ class _Argument:
             artifact = Artifact(
                 item.entry.hash, record.started, record.tool_told, command, tuple(sorted(record.outputs.items()))
             )
-            yield Element(
-                self.new(Sort.SOLUTION),
+            yield self.made(
                 Sort.SOLUTION,
                 record.summary,
                 defeated=weight.refuted,

@@ -61,15 +61,11 @@ def test_every_line_meets_the_published_schema(tmp_path: Path) -> None:
     assert encode(from_json(Evidence, line["evidence"])) == line["evidence"]
 
 
-def test_latest_and_current(tmp_path: Path) -> None:
+def test_what_is_current(tmp_path: Path) -> None:
     ledger = Ledger(tmp_path / "x.jsonl")
     old, new = evidence("n.g", key="old"), evidence("n.g", Verdict.UNKNOWN, key="new")
     ledger.append_all([old, new, evidence("n.g", method="dafny", key="other")])
-    latest = ledger.latest(old.obligation, "hoare")
-    assert latest is not None
-    assert latest.evidence == new
     assert [e.evidence for e in ledger.current(old.obligation, "old")] == [old]
-    assert ledger.latest(old.obligation, "none") is None
 
 
 def test_the_same_evidence_is_kept_once(tmp_path: Path) -> None:

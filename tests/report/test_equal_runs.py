@@ -19,8 +19,8 @@ from avow.base.verdict import Verdict
 from avow.evidence.ledger import Ledger
 
 _OWN = re.compile(
-    r"\d{8}T\d{6}\.\d+-\d+|\d{4}-\d\d-\d\d[T ]\d\d:\d\d[\d:.+Z]*|\b_?[0-9a-f]{8,64}\b|\b(?:[Rr]ecord|no\.|#)\s*\d+\b"
-    r'|[\d.]+ s\b|"(?:number|n|seconds)": [\d.]+'
+    r"\d{8}T\d{6}\.\d+-\d+|\d{4}-\d\d-\d\d[T ]\d\d:\d\d[\d:.+Z]*|\b_?[0-9a-f]{8,64}\b"
+    r'|\b(?:[Rr]ecord|no\.|#)\s*[0-9a-f]+\b|[\d.]+ s\b|"(?:number|n|seconds)": [\d.]+'
 )
 
 
