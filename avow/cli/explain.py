@@ -21,7 +21,7 @@ from avow.evidence.ledger import Ledger, readable
 from avow.evidence.obligation import Kind
 from avow.pipeline.report_check import outdated
 from avow.pipeline.run_info import today
-from avow.report.explained import explained, left_out
+from avow.report.explained import explained, left_out, named
 from avow.report.terminal import show_obligation
 
 
@@ -164,37 +164,25 @@ def find_claim(
 
     Raises Rejected if there is none. `without_report`: systems without a report.
     """
-    named = [(case, view) for case in cases for view in case.obligations]
+    every = [(case, view) for case in cases for view in case.obligations]
     for test in (
         lambda view: view.id == wanted,
         lambda view: wanted.removeprefix(f"{view.obligation.system}/") in (view.obligation.local_id, short(view.id)),
         lambda view: wanted and (view.id.endswith("/" + wanted) or view.obligation.digest.startswith(wanted)),
     ):
-        found = tuple((case, view) for case, view in named if test(view))
+        found = tuple((case, view) for case, view in every if test(view))
         if found:
             return found
     system = wanted.partition("/")[0]
     if system in without_report:
         hint = f"`avow verify {system}` makes one; it says why, if there is something wrong with the system's files"
         raise Rejected(Diagnostic("REPORT001", f"there is no report of {system} yet", hint=hint))
-    known = [name for _, view in named for name in (short(view.id), view.id)]
-    known += [name for case in cases for name in _names(case)]
-    guarantees = [short(view.id) for _, view in named if view.obligation.kind is Kind.GUARANTEE]
+    known = [name for _, view in every for name in (short(view.id), view.id)]
+    known += [name for case in cases for _, names, _ in named(case) for name in names]
+    guarantees = [short(view.id) for _, view in every if view.obligation.kind is Kind.GUARANTEE]
     such = f" (such as {guarantees[0]})" if guarantees else ""
     kinds = (
         f"a guarantee{such}, a requirement, node, assumption, gate or file, a diagnostic's code, a word of the report"
     )
     hint = did_you_mean(wanted, known, 3) or f"known: {kinds}"
     raise Rejected(Diagnostic("LEDGER002", f"nothing in the reports is called '{wanted}'", hint=hint))
-
-
-def _names(case: Case) -> Iterator[str]:
-    """The names in a case other than obligations'."""
-    yield case.system
-    yield from (node.name for node in case.nodes)
-    yield from (r.id for r in case.requirements)
-    yield from (name for s in case.assumptions for name in (s.number, s.key))
-    yield from (w.key for w in case.deficits)
-    yield from (gate.id for gate in case.gates)
-    yield from (d.derivation.name for d in case.derivations)
-    yield from (method.name for method in case.methods)

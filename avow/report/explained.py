@@ -32,7 +32,7 @@ _CODE = re.compile(r"[A-Z]{2,9}[0-9]{3}\Z")
 
 def explained(case: Case, name: str) -> Iterator[Explanation]:
     """Everything in the case that has the name, except obligations; for a digest or a file where report.json has it."""
-    found = [(heading, lines) for heading, names, lines in _named(case) if name in names]
+    found = [(heading, lines) for heading, names, lines in named(case) if name in names]
     if _CODE.match(name):
         found += _of_code(name)
     if _MARK.match(name) and not found:
@@ -59,7 +59,7 @@ def left_out(case: Case, records: Iterable[Entry], name: str) -> Iterator[Explan
             yield heading, [*lines, why]
 
 
-def _named(case: Case) -> Iterator[tuple[str, tuple[str, ...], list[str]]]:
+def named(case: Case) -> Iterator[tuple[str, tuple[str, ...], list[str]]]:
     """(heading, its names, lines) of everything that has a name of its own."""
     yield f"system {case.system}", (case.system,), [case.title, case.answers.told, case.answers.beside]
     ran = f"begun {case.run.started}, {case.run.seconds:g} s, Avow {case.run.avow_version}"
