@@ -5,7 +5,7 @@
                                         attestation.jsonl
     on_demand.export(case, folder, …)   writes report.pdf report.sarif gsn.yaml gsn.svg sacm.xml qualification.html
                                         traceability.html traceability.csv traceability.reqif
-    write_index(cases, folder)          writes <folder>/index.html over all systems, with the trend over runs
+    write_index(cases, folder)          writes <folder>/index.html over all systems
 
 All are idempotent, write each file in one step and leave unchanged files alone. They return the paths of the files.
 """
