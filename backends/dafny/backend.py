@@ -125,7 +125,7 @@ class DafnyBackend(Backend):
         )
         if len(missing) == len(names):
             return Translated({}, missing)
-        return Translated({**_specification(generated), generated.impl_file: generated.skeleton()}, missing)
+        return Translated({**_specification(generated), generated.impl_file: generated.skeleton}, missing)
 
     def discharge(self, job: Job, folder: Path, limits: Limits) -> Report:
         from avow.isolation.outside import Outside

@@ -249,7 +249,7 @@ def _files(generated: Generated, scanned: Scan, guarantees: tuple[str, ...], ask
 def _asked_of_env(files: Mapping[str, str], generated: Generated) -> dict[str, str]:
     """Dafny's input files to determine what Env excludes."""
     head, end, _ = files[generated.contract_file].rpartition("}")
-    whole = f"{head}{generated.situations}\n{end}\n"
+    whole = f"{head}{generated.situations}{end}\n"
     return {**files, generated.contract_file: whole, EXCLUDED_FILE: generated.excluded}
 
 

@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from avow.backend_kit.stepping import stepping
 from avow.base.plain import one_line
@@ -14,10 +19,9 @@ from avow.formulas.temporal.cells import remembers
 from avow.language.contract import Clause, Node
 from avow.language.operators import OPERATORS, Level
 from avow.language.sorts import DataSort, EnumSort, OpaqueSort
-from avow.language.terms import Variable
 from avow.sanity.claims import triggers
 
-from .history import ESTABLISHED, History, declared, history
+from .history import ESTABLISHED, History, history
 from .printer import (
     RESERVED,
     Names,
@@ -34,17 +38,6 @@ from .printer import (
 _MODULE = 'module {:options "--function-syntax:3"}'
 """Ignored by 2.3; makes `predicate` ghost in 4.x, as it is in 2.3."""
 
-_HELPERS = """\
-  // Partial operations: nothing is known of what they yield outside their domains.
-  function DivideByZero(a: real): real
-  function Divide(a: real, b: real): real { if b != 0.0 then a / b else DivideByZero(a) }
-  function Beyond<T>(s: seq<T>, i: int): T
-  function Nth<T>(s: seq<T>, i: int): T { if 0 <= i < |s| then s[i] else Beyond(s, i) }
-  // The integers from a to b, both included.
-  function Upto(a: int, b: int): seq<int>
-    decreases b - a
-  { if b < a then [] else [a] + Upto(a + 1, b) }
-"""
 _FUNCTIONS = {
     "AbsInt": "(a: int): nat { if a < 0 then 0 - a else a }",
     "AbsReal": "(a: real): real { if a < 0.0 then 0.0 - a else a }",
@@ -91,8 +84,8 @@ class Generated:
     types: str
     contract: str
     spec: str
-    outline: str
-    """The implementation's module, to be filled in."""
+    skeleton: str
+    """A first implementation, to be filled in, beside the generated files."""
     ensures: tuple[tuple[int, str], ...]
     probe_module: str
     probe: str
@@ -110,10 +103,6 @@ class Generated:
     """The guarantee of each of them."""
     remembers: bool = False
     """Whether the contract refers to other steps, so that there is a history."""
-
-    def skeleton(self) -> str:
-        """A first implementation, beside the generated files."""
-        return f'include "{self.spec_file}"\n{self.outline}'
 
     @property
     def lemmas(self) -> tuple[str, ...]:
@@ -163,52 +152,91 @@ def generate(node: Node, guarantees: Sequence[str]) -> Generated:
             uncovered.append((clause.name, problem.what))
     types_file, contract_file, spec_file = "types.dfy", f"{stem}_contract.dfy", f"{stem}_spec.dfy"
     impl_file = f"{stem}_impl.dfy"
-    clauses = list(zip(node.assumptions, assumed, strict=True)) + promised
-    written = _contract(past, clauses, words, types_file)
-    spec, ensures = _spec(node, past, assumed, promised, words, spec_module, contract_file, uncovered)
-    probe, probe_ensures = _probe(node, past, assumed, promised, words, probe_module, impl_module)
-    outline = _outline(past, inputs, outputs, words, spec_module, impl_module)
-    types = _types(words)
-    situations, excluded, conditions = _excluded(node, past, assumed, promised, words, impl_module)
+    render = _renderer(
+        words,
+        past,
+        node=one_line(node.name),
+        spec_module=spec_module,
+        impl_module=impl_module,
+        probe_module=probe_module,
+        types_file=types_file,
+        contract_file=contract_file,
+        spec_file=spec_file,
+        clauses=[
+            (_head(clause), predicates)
+            for clause, predicates in (*zip(node.assumptions, assumed, strict=True), *promised)
+        ],
+        assumed=[predicates[-1] for predicates in assumed],
+        promised=[predicates[-1] for _, predicates in promised],
+        uncovered=[(one_line(name), one_line(why)) for name, why in uncovered],
+        inputs=signature(inputs, words),
+        outputs=signature(outputs, words),
+        arguments=", ".join(map(words.local, inputs)),
+        results=", ".join(map(words.local, outputs)),
+    )
+    contract, spec, probe, skeleton = map(render, ("contract", "spec", "probe", "skeleton"))
+    types = render(
+        "types", body=_types(words), functions=[pair for pair in _FUNCTIONS.items() if pair[0] in words.functions]
+    )
+    conditions = _conditions([clause for clause, _ in promised], words)
+    covered = [clause.name for clause, _ in promised]
+    situations = render("situations", declarations=[each for _, made in conditions for each in made])
+    excluded = render(
+        "excluded", excluded_module=words.names.fresh("Excluded"), situations=[made[-1] for _, made in conditions]
+    )
     return Generated(
-        node.name, spec_module, impl_module, types_file, contract_file, spec_file, impl_file, types, written,
-        spec, outline, ensures, probe_module, probe, probe_ensures, tuple(uncovered), situations, excluded, conditions,
-        bool(past.cells),
+        node.name, spec_module, impl_module, types_file, contract_file, spec_file, impl_file, types, contract, spec,
+        skeleton, _ensures(spec, covered), probe_module, probe, _ensures(probe, covered), tuple(uncovered), situations,
+        excluded, tuple(name for name, _ in conditions), bool(past.cells),
     )  # fmt: skip
 
 
-def _excluded(
-    node: Node,
-    past: History,
-    assumed: Sequence[tuple[Predicate, ...]],
-    promised: Sequence[tuple[Clause, tuple[Predicate, ...]]],
-    words: Vocabulary,
-    impl_module: str,
-) -> tuple[str, str, tuple[str, ...]]:
-    """Predicates for conditions of guarantees, a module that checks what excludes them, and the guarantee of each."""
-    taken = signature([p.variable for p in (*node.inputs, *node.outputs)], words)
-    env = f"Implementation.Env({', '.join(words.local(p.variable) for p in node.inputs)})"
-    sane = [f"    requires {past.call(p[-1], words)}" for p in assumed]
-    predicates, lemmas, whose = list[str](), list[str](), list[str]()
-    for clause, _ in promised:
+def _renderer(words: Vocabulary, past: History, **values: object) -> Callable[..., str]:
+    """Renders a template by name, with these values and more."""
+    values |= {
+        "module": _MODULE,
+        "past": past,
+        "history": "h: Contract.History" if past.cells else "",
+        "kept": "ghost h: Contract.History, m: Memory" if past.cells else "",
+        "left": "n: Memory" if past.cells else "",
+        "advanced": f"Contract.Advance({', '.join(('h', *map(words.local, past.ports)))})",
+        "signature": lambda variables: signature(variables, words),
+        "sort": lambda variable: sort_text(variable.sort, words),
+        "call": lambda predicate, module="Contract.": past.call(predicate, words, module),
+    }
+    return lambda name, **more: _templates().get_template(f"{name}.j2").render(values, **more)
+
+
+@cache
+def _templates() -> Environment:
+    return Environment(
+        loader=FileSystemLoader(Path(__file__).with_name("templates")),
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )
+
+
+def _conditions(promised: Sequence[Clause], words: Vocabulary) -> list[tuple[str, tuple[Predicate, ...]]]:
+    """Predicates for conditions of guarantees, and the guarantee of each."""
+    found: list[tuple[str, tuple[Predicate, ...]]] = []
+    for clause in promised:
         for situation in triggers(clause.formula):
-            try:
-                found = print_clause(f"{clause.name} condition {len(whose)}", situation, words)
-            except NotExpressible:
-                continue
-            for predicate in found:
-                predicates += declared(predicate, "bool", words)
-            for name, more in ((BY_ENV, [f"    requires {env}"]), (ANYWAY, [])):
-                lemmas += ["", f"  lemma {name}{len(whose)}({past.given(taken, program=False)})", *sane, *more]
-                lemmas += [f"    ensures !{past.call(found[-1], words)}", "  { }"]
-            whose.append(clause.name)
-    head = ["  import Types", "  import Contract", f"  import Implementation = {impl_module}"]
-    module = "\n".join([f"{_MODULE} {words.names.fresh('Excluded')} {{", *head, *lemmas, "}", ""])
-    return "\n".join(predicates), module, tuple(whose)
+            with suppress(NotExpressible):
+                found.append((clause.name, print_clause(f"{clause.name} condition {len(found)}", situation, words)))
+    return found
 
 
-def _types(words: Vocabulary) -> str:
-    lines = ["// Generated: the types of the contract. Do not edit.", f"{_MODULE} Types {{"]
+def _ensures(text: str, promised: Sequence[str]) -> tuple[tuple[int, str], ...]:
+    """For each promised guarantee, the line of its `ensures`: the first ones of the only method."""
+    lines = list(enumerate(text.split("\n"), start=1))
+    method = next(number for number, line in lines if line.startswith("  method "))
+    after = (number for number, line in lines[method:] if line.startswith("    ensures "))
+    return tuple(zip(after, promised, strict=False))  # after them comes that of the invariant
+
+
+def _types(words: Vocabulary) -> list[str]:
     # The types of constructors' parameters may add further types, so this is not a plain loop.
     done: set[object] = set()
     body: list[str] = []
@@ -216,8 +244,7 @@ def _types(words: Vocabulary) -> str:
         for sort in pending:
             done.add(sort)
             body.append(_type(sort, words))
-    used = (f"  function {name}{rest}" for name, rest in _FUNCTIONS.items() if name in words.functions)
-    return "\n".join([*lines, *body, _HELPERS.rstrip("\n"), *used, "}", ""])
+    return body
 
 
 def _type(sort: object, words: Vocabulary) -> str:
@@ -250,155 +277,10 @@ def _local_type(sort: object, words: Vocabulary) -> str:
     return sort_text(sort, words).replace("Types.", "")  # type: ignore[arg-type]
 
 
-def _contract(
-    past: History, clauses: Sequence[tuple[Clause, tuple[Predicate, ...]]], words: Vocabulary, types_file: str
-) -> str:
-    lines = [
-        "// Generated: one predicate for each clause of the contract, and one for each quantifier's body. Do not edit.",
-        f'include "{types_file}"',
-        f"{_MODULE} Contract {{",
-        "  import Types",
-        *past.contract(words),
-    ]
-    for clause, predicates in clauses:
-        lines.append("")
-        lines.append(f"  // {clause.kind} {one_line(clause.name)}" + _sentence(clause))
-        for predicate in predicates:
-            lines += declared(predicate, "bool", words)
-    return "\n".join([*lines, "}", ""])
-
-
-def _spec(
-    node: Node,
-    past: History,
-    assumed: Sequence[tuple[Predicate, ...]],
-    promised: Sequence[tuple[Clause, tuple[Predicate, ...]]],
-    words: Vocabulary,
-    spec_module: str,
-    contract_file: str,
-    uncovered: Sequence[tuple[str, str]],
-) -> tuple[str, tuple[tuple[int, str], ...]]:
-    inputs = signature([p.variable for p in node.inputs], words)
-    outputs = signature([p.variable for p in node.outputs], words)
-    env = f"Env({', '.join(words.local(p.variable) for p in node.inputs)})"
-    lines = [
-        f"// Generated: what an implementation of node {one_line(node.name)} must do. Do not edit.",
-        *(
-            f"// Not here: guarantee {one_line(name)}: Dafny has no counterpart for {one_line(why)}"
-            for name, why in uncovered
-        ),
-        f'include "{contract_file}"',
-        f"abstract {_MODULE} {spec_module} {{",
-        "  import Types",
-        "  import Contract",
-        "",
-        *past.specification(),
-        "  // The implementer's: what else is assumed of the inputs (reported as an added assumption), or true.",
-        f"  predicate Env({inputs})",
-        "",
-        "  // The implementer's: inputs that meet every assumption, so that nothing is proved of no case at all.",
-        f"  lemma EnvNotEmpty({past.given('', program=False)}){f' returns ({inputs})' if inputs else ''}",
-        *(("    requires Contract.Begins(h)",) if past.cells else ()),
-        *(f"    ensures {past.call(p[-1], words)}" for p in assumed),
-        f"    ensures {env}",
-        "",
-        f"  method Step({past.given(inputs)})" + (f" returns ({left})" if (left := past.left(outputs)) else ""),
-        *(f"    requires {past.call(p[-1], words)}" for p in assumed),
-        f"    requires {env}",
-        *(("    requires Linked(h, m)",) if past.cells else ()),
-    ]
-    ensures = []
-    for clause, predicates in promised:
-        lines.append(f"    ensures {past.call(predicates[-1], words)}")
-        ensures.append((len(lines), clause.name))
-    if past.cells:
-        lines.append(f"    ensures Linked({past.advanced(words)}, n)")
-    return "\n".join([*lines, "}", ""]), tuple(ensures)
-
-
-def _probe(
-    node: Node,
-    past: History,
-    assumed: Sequence[tuple[Predicate, ...]],
-    promised: Sequence[tuple[Clause, tuple[Predicate, ...]]],
-    words: Vocabulary,
-    probe_module: str,
-    impl_module: str,
-) -> tuple[str, tuple[tuple[int, str], ...]]:
-    taken = signature([p.variable for p in node.inputs], words)
-    given = signature([p.variable for p in node.outputs], words)
-    arguments = ", ".join(words.local(p.variable) for p in node.inputs)
-    results = ", ".join(words.local(p.variable) for p in node.outputs)
-    sane = [f"    requires {past.call(p[-1], words)}" for p in assumed]
-    left = past.left(given, "Implementation.Memory")
-    asked = past.given(taken).replace("m: Memory", "m: Implementation.Memory", 1)
-    passed = ", ".join((*(("h", "m") if past.cells else ()), *((arguments,) if arguments else ())))
-    found = ", ".join((*(("n",) if past.cells else ()), *((results,) if results else ())))
-    lines = [
-        f"// Generated: {impl_module} used from outside. Do not edit.",
-        f"{_MODULE} {probe_module} {{",
-        "  import Types",
-        "  import Contract",
-        f"  import Implementation = {impl_module}",
-        "",
-        f"  method {CALL}({asked})" + (f" returns ({left})" if left else ""),
-        *sane,
-        f"    requires Implementation.Env({arguments})",
-        *(("    requires Implementation.Linked(h, m)",) if past.cells else ()),
-    ]
-    ensures = []
-    for clause, predicates in promised:
-        lines.append(f"    ensures {past.call(predicates[-1], words)}")
-        ensures.append((len(lines), clause.name))
-    if past.cells:
-        lines.append(f"    ensures Implementation.Linked({past.advanced(words)}, n)")
-    lines.append(f"  {{ {f'{found} := ' if found else ''}Implementation.Step({passed}); }}")
-    lines += past.probe()
-    lines += [
-        "",
-        f"  lemma {ENV_ALWAYS}({past.given(taken, program=False)})",
-        *sane,
-        f"    ensures Implementation.Env({arguments})",
-        "  { }",
-    ]
-    return "\n".join([*lines, "}", ""]), tuple(ensures)
-
-
 def without_env_always(probe: str) -> str:
     """The probe for an implementation whose Env excludes something."""
     return probe[: probe.index(f"\n  lemma {ENV_ALWAYS}(")] + "}\n"
 
 
-def _outline(
-    past: History,
-    inputs: Sequence[Variable],
-    outputs: Sequence[Variable],
-    words: Vocabulary,
-    spec_module: str,
-    impl_module: str,
-) -> str:
-    taken = signature(inputs, words)
-    given = signature(outputs, words)
-    lines = [
-        f"{_MODULE} {impl_module} refines {spec_module} {{",
-        *past.skeleton(),
-        f"  predicate Env({taken}) {{ true }}",
-        "",
-        f"  lemma EnvNotEmpty({past.given('', program=False)}){f' returns ({taken})' if taken else ''}",
-        "  {",
-        "    // give inputs that meet every assumption",
-        "  }",
-        "",
-        f"  method Step({past.given(taken)})" + (f" returns ({left})" if (left := past.left(given)) else ""),
-        "  {",
-        "    // set the outputs; name the witnesses of existential guarantees, for example",
-        "    // assert Contract.guarantee_ex1(…, witness);",
-        "  }",
-        "}",
-        "",
-    ]
-    return "\n".join(lines)
-
-
-def _sentence(clause: Clause) -> str:
-    return f": {one_line(clause.sentence)}" if clause.sentence else ""
+def _head(clause: Clause) -> str:
+    return f"{clause.kind} {one_line(clause.name)}" + (f": {one_line(clause.sentence)}" if clause.sentence else "")

@@ -62,6 +62,7 @@ ELSEWHERE = {
     "avow/solving/z3_sorts._kept": "a Z3 context for questions of evaluation, each of which has one answer",
     "avow/solving/z3_sorts._session": "the Z3 context of a node's questions, for the time of its claims",
     "avow/system/schema._validator": ONCE,
+    "backends/dafny/modules._templates": ONCE,
 }
 """What outlives a call in the other rooms, and why it may."""
 FUNCTIONS = {"attrgetter", "itemgetter"}
