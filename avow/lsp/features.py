@@ -13,8 +13,10 @@ from avow.language.contract import Clause, Contract, Node, Port
 from avow.language.definitions import show_clause
 from avow.language.lexer import Token
 from avow.language.load import clean_text
-from avow.language.printer import show_term, show_type
+from avow.language.printer import show_sort, show_term, show_type
 from avow.language.scope import of_contract
+from avow.language.subterms import subterms
+from avow.language.terms import Quantified
 from avow.lsp.names import CLAUSES, Meaning, Occurrence, Text, What, at_offset, taken_apart
 from avow.lsp.project import Project, about_plan, is_plan, project_of
 from avow.lsp.renaming import all_occurrences
@@ -155,7 +157,11 @@ def _of_meaning(contract: Contract, meaning: Meaning, status: StatusLookup, sani
         case What.FIELD:
             return f"field `{name}` of a record"
         case What.VARIABLE:
-            return f"`{name}` (quantified)"
+            formulas = (clause.formula for node in contract.nodes for clause in node.clauses)
+            quantified = (part for formula in formulas for part in subterms(formula) if isinstance(part, Quantified))
+            sorts = {v.sort for part in quantified for v in part.variables if v.name == name}
+            of = f" : `{show_sort(sorts.pop())}`" if len(sorts) == 1 else ""
+            return f"`{name}`{of} (quantified)"
 
 
 def _about_clause(clause: Clause, node: Node, status: StatusLookup, sanity: SanityLookup) -> str:

@@ -183,15 +183,3 @@ def test_the_smtlib_script_is_one_step_of_any_run() -> None:
                 solver.add((z3.Bool(name) if isinstance(v, bool) else z3.Int(name)) == v)
             held = value(contract.nodes[0].guarantees[0].formula, [{"in.a": a, "out.b": b, "in.n": n}], 0)
             assert (solver.check() == z3.sat) is held, text
-
-
-def test_english_is_read_one_way() -> None:
-    clauses = "guarantee g ( not held[2 steps](a) and once(not b or a) )"
-    clauses += " guarantee h ( held[2 steps](not a) -> within[3 steps](b) )"
-    contract, _ = check_text(f"node n {{ inputs( a : BOOL ) outputs( b : BOOL ) topics() {clauses} }}", "n.rcl")
-    assert contract is not None
-    shown = [show_term(c.formula, "text") for c in contract.nodes[0].guarantees]
-    assert shown == [
-        "not (in.a for 2 steps already) and ((not out.b or in.a) at some step up to now)",
-        "(not in.a) for 2 steps already implies out.b within 3 steps",
-    ]
