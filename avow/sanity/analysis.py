@@ -2,8 +2,7 @@
 
 `proved` is always good and `refuted` always bad (see the table in `avow.sanity.claims`). A refutation carries a
 replayed counterexample in the contract's terms, or the smallest conflicting sets of clauses, or both. A claim that the
-solver cannot decide stays `unknown`. With a scenario (concrete values of some inputs), an unknown claim about all
-inputs is tried for these values; if it holds there, it is `checked` and marked as bounded.
+solver cannot decide stays `unknown`. An example that a claim needs may have the values that a scenario gives inputs.
 """
 
 from __future__ import annotations
@@ -50,7 +49,7 @@ def analyse(
 ) -> tuple[SanityResult, ...]:
     """Decide a node's claims, in order; with `wanted`, only the claims of these names are reported. Earlier claims are
     decided all the same: claims that stay open leave less effort for later ones, and no answer may depend on `wanted`.
-    `scenario` fixes some inputs, if no answer for all values is found.
+    `scenario` fixes some inputs of an example that is not found otherwise.
     """
     bounds = bounds or Bounds()
     analysis = (
@@ -97,7 +96,7 @@ class _Analysis:
         self.guarantees = {c.name: c.formula for c in node.guarantees}
         self.known: dict[str, Finding] = {}
         self.claims = {claim.name: claim for claim in claims(node)}
-        self.answer: tuple[Realizability, bool] | None = None
+        self.answer: Realizability | None = None
 
     def settle(self, claim: Claim) -> Finding:
         if claim.name not in self.known:
@@ -156,8 +155,8 @@ class _Analysis:
         texts = ("no inputs and outputs meet {} together", "no inputs and outputs meet {}")
         finding = self._possible(together, *texts, limit=CONSISTENT_EFFORT)
         if finding.verdict is Verdict.UNKNOWN and self.limit > CONSISTENT_EFFORT:
-            answer, bounded = self._realizability()
-            if answer.verdict is Verdict.PROVED and not bounded:
+            answer = self._realizability()
+            if answer.verdict is Verdict.PROVED:
                 allowed = self._other("assumptions-satisfiable")
                 return Finding(allowed.verdict, allowed.explanation, engine=answer.engine)
             finding = self._possible(together, *texts)
@@ -165,34 +164,25 @@ class _Analysis:
             return replace(finding, because="assumptions-satisfiable")
         return finding
 
-    def _realizability(self) -> tuple[Realizability, bool]:
-        """The answer, and whether it holds only for the scenario."""
-        if self.answer is not None:
-            return self.answer
-        start = spent()
-
-        limit = 2 * self.patience.effort(serious=True)
-        answer, bounded = self._ask(self.assumptions, self.guarantees, limit), False
-        if answer.verdict is Verdict.UNKNOWN and self.scenario:
-            within = self._ask(self.assumptions, self.guarantees, limit, given=self.scenario)
-            if within.verdict is not Verdict.UNKNOWN:
-                answer, bounded = within, within.verdict is Verdict.PROVED
-        self.answer = answer, bounded
-        if answer.verdict is Verdict.UNKNOWN:
-            self.patience.lose(spent() - start)
+    def _realizability(self) -> Realizability:
+        if self.answer is None:
+            start = spent()
+            limit = 2 * self.patience.effort(serious=True)
+            self.answer = self._ask(self.assumptions, self.guarantees, limit)
+            if self.answer.verdict is Verdict.UNKNOWN:
+                self.patience.lose(spent() - start)
         return self.answer
 
     def _realizable(self) -> Finding:
-        answer, bounded = self._realizability()
+        answer = self._realizability()
         if answer.verdict is Verdict.PROVED:
             allowed = self._other("assumptions-satisfiable")
             if allowed.verdict is Verdict.ERROR:
                 return replace(allowed, because="assumptions-satisfiable")
             if allowed.verdict is Verdict.REFUTED:
                 return Finding(Verdict.PROVED, "vacuously: no input is allowed", because="assumptions-satisfiable")
-            verdict = Verdict.CHECKED if bounded else Verdict.PROVED
             given = f"given {listing(answer.needed)}" if answer.needed else ""
-            return Finding(verdict, given, answer.needed, engine=answer.engine, bounded=bounded)
+            return Finding(Verdict.PROVED, given, answer.needed, engine=answer.engine)
         if answer.verdict is not Verdict.REFUTED:
             return Finding(Verdict.UNKNOWN, answer.reason, engine=answer.engine)
         found = conflicts(
@@ -276,7 +266,7 @@ class _Analysis:
             return Finding(Verdict.REFUTED, "it rules out nothing that the others do not", (name,), because=weaker)
         because = self._if_refuted("assumptions-satisfiable")
         unused = Finding(Verdict.REFUTED, "every guarantee can be met without it", (name,), because=because)
-        if self._other("realizable").verdict is Verdict.PROVED and name not in self._realizability()[0].needed:
+        if self._other("realizable").verdict is Verdict.PROVED and name not in self._realizability().needed:
             return unused
         # Only the inputs that it rules out matter: it is not needed if each of them has an output.
         outside = {label: negation(f) if label == name else f for label, f in self.assumptions.items()}
@@ -339,11 +329,8 @@ class _Analysis:
 
     # -- asking --------------------------------------------------------------------------------------------------------
 
-    def _ask(
-        self, assumed: Formulas, wanted: Formulas, effort: int, *, given: Given | None = None, doubtful: bool = False
-    ) -> Realizability:
-        about = self.inputs, self.outputs, assumed, wanted
-        return realizable(*about, given=given, effort=effort, seed=self.seed, doubtful=doubtful)
+    def _ask(self, assumed: Formulas, wanted: Formulas, effort: int, *, doubtful: bool = False) -> Realizability:
+        return realizable(self.inputs, self.outputs, assumed, wanted, effort=effort, seed=self.seed, doubtful=doubtful)
 
     def _if_refuted(self, name: str) -> str | None:
         return name if name in self.claims and self._other(name).verdict is Verdict.REFUTED else None

@@ -57,7 +57,7 @@ class Result:
     name: str
     claim: str
     verdict: Verdict
-    """`checked`: only within the plan's scenario; `error`: two solvers contradict each other."""
+    """`error`: two solvers contradict each other."""
     severity: Severity
     """How bad it is if the claim is false."""
     clauses: tuple[str, ...]
@@ -66,7 +66,6 @@ class Result:
     conflicts: tuple[Conflict, ...]
     because: str | None
     engine: str
-    bounded: bool
     seconds: float
     place: Place | None
 
@@ -85,7 +84,7 @@ def to_document(result: SanityResult) -> Result:
     return Result(
         *(result.node, asked.about, asked.subject, asked.name, asked.sentence, result.verdict, asked.severity),
         *(result.clauses, None if shown is None else _shown(shown), result.explanation, conflicts),
-        *(result.because, result.engine, result.bounded, round(result.seconds, 3)),
+        *(result.because, result.engine, round(result.seconds, 3)),
         None if span is None else Place(span.file, span.line, span.column),
     )
 

@@ -36,7 +36,7 @@ from avow.sanity.witnesses import Fixed, Witness, applied, meanings_of
 from avow.solving.checking import check
 from avow.solving.questions import entails, solve
 from avow.solving.replay import replay
-from avow.solving.translation import Expr, Meaning, Translator, Unsupported
+from avow.solving.translation import Expr, Translator, Unsupported
 from avow.solving.z3_module import z3
 
 Formulas = Mapping[str, t.Term]
@@ -59,7 +59,6 @@ def confirmed(
     proofs: Sequence[Proof],
     assumptions: Formulas,
     guarantees: Formulas,
-    given: Mapping[t.Variable, Value],
     *,
     effort: int,
     seed: int = 0,
@@ -72,8 +71,8 @@ def confirmed(
     try:
         return all(
             # without alternatives no axiom is used
-            (not proof.alternatives or _conservative(proof, given))
-            and _met(proof, assumptions, given, effort, seed)
+            (not proof.alternatives or _conservative(proof))
+            and _met(proof, assumptions, effort, seed)
             and implied(proof.shown, guarantees, effort=effort, seed=seed)
             for proof in proofs
         )
@@ -152,7 +151,7 @@ def _align(one: t.Term, body: t.Term, variables: set[t.Variable], values: dict[t
             _align(part, other, variables, values)
 
 
-def _met(proof: Proof, assumptions: Formulas, given: Mapping[t.Variable, Value], effort: int, seed: int) -> bool:
+def _met(proof: Proof, assumptions: Formulas, effort: int, seed: int) -> bool:
     """Whether there is no allowed input, with constants that satisfy the axioms, at which every alternative fails."""
     shown = tuple(proof.shown.values())
     if not proof.alternatives:
@@ -161,34 +160,31 @@ def _met(proof: Proof, assumptions: Formulas, given: Mapping[t.Variable, Value],
         if bound:
             never = t.Quantified(t.Quantifier.FORALL, tuple(bound.values()), never)
         formulas = (*assumptions.values(), never)
-        return solve(formulas, effort=effort, seed=seed, given=given, variables=proof.inputs).status == "unsat"
+        return solve(formulas, effort=effort, seed=seed, variables=proof.inputs).status == "unsat"
     translator = Translator()
-    fixed: dict[t.Variable, Meaning] = {v: translator.value(value, v.sort) for v, value in given.items()}
-    # given values determine the elements of an unspecified sort; values that the search found do not
-    facts = [*translator.opaque_facts(), *(translator.term(formula, fixed) for formula in proof.axioms)]
-    facts += [z3.Not(_meets(translator, shown, alternative, fixed)) for alternative in proof.alternatives]
+    # values that the search found do not determine the elements of an unspecified sort
+    facts = [*translator.opaque_facts(), *map(translator.term, proof.axioms)]
+    facts += [z3.Not(_meets(translator, shown, alternative)) for alternative in proof.alternatives]
     # an output that an alternative leaves out may have any value
     free = {v for formula in (*assumptions.values(), *shown) for v in free_variables(formula)}
     free -= {v for v in proof.outputs if all(v in alternative for alternative in proof.alternatives)}
     named = dict.fromkeys((*proof.inputs, *proof.constants.constants))
-    free.difference_update(fixed, named)
+    free.difference_update(named)
     facts += translator.background([*named, *sorted(free, key=lambda v: v.qualified)])
-    tracked = [(label, translator.term(formula, fixed)) for label, formula in assumptions.items()]
+    tracked = [(label, translator.term(formula)) for label, formula in assumptions.items()]
     return check(translator, facts, tracked=tracked, effort=effort, seed=seed).status == "unsat"
 
 
-def _meets(
-    translator: Translator, shown: Iterable[t.Term], alternative: Witness, fixed: Mapping[t.Variable, Meaning]
-) -> Expr:
+def _meets(translator: Translator, shown: Iterable[t.Term], alternative: Witness) -> Expr:
     terms = {
         output: _widened(value, output)
         for output, value in alternative.items()
         if not isinstance(value, Fixed | Definition)
     }
     others = {output: value for output, value in alternative.items() if output not in terms}
-    meanings = {**fixed, **meanings_of(translator, alternative, fixed)}
+    meanings = meanings_of(translator, alternative, {})
     members = translator.background(alternative, meanings)
-    left = {**fixed, **{v: meanings[v] for v in others}}
+    left = {v: meanings[v] for v in others}
     return z3.And(
         [*members, *(translator.term(substitute(applied(formula, alternative), terms), left) for formula in shown)]
     )
@@ -199,10 +195,10 @@ def _widened(value: object, output: t.Variable) -> t.Term:
     return t.Widen(value, REAL) if output.sort == REAL and value.sort in (INTEGER, NATURAL) else value
 
 
-def _conservative(proof: Proof, given: Mapping[t.Variable, Value]) -> bool:
+def _conservative(proof: Proof) -> bool:
     """Whether suitable constants exist for all inputs: each axiom introduces new constants."""
     found = proof.constants
-    taken = {*proof.inputs, *proof.outputs, *given}
+    taken = {*proof.inputs, *proof.outputs}
     if any(constant.role is not t.Role.BOUND or constant in taken for constant in found.constants):
         return False
     blocks = iter(found.blocks)

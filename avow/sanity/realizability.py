@@ -13,7 +13,7 @@ replaced by functions, tuples by their items, and functions by their values at a
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 from avow.base.tuning.effort import CONFIRMING_EFFORT, REALIZABLE_SHARE
@@ -33,15 +33,13 @@ from avow.solving.translation import same_session
 
 @dataclass(frozen=True, slots=True)
 class Question:
-    """Is there, for all `inputs` that satisfy the assumptions, an output that meets the guarantees? `given` fixes some
-    inputs (a scenario): the answer is then about these only. `doubtful`: probably not, so inputs without an output are
-    searched for first."""
+    """Is there, for all `inputs` that satisfy the assumptions, an output that meets the guarantees? `doubtful`:
+    probably not, so inputs without an output are searched for first."""
 
     inputs: tuple[Variable, ...]
     outputs: tuple[Variable, ...]
     assumptions: Formulas
     guarantees: Formulas
-    given: Given = field(default_factory=dict)
     effort: int = 10_000
     seed: int = 0
     doubtful: bool = False
@@ -51,7 +49,7 @@ class Question:
         return next(g for g in groups(self.guarantees, self.outputs) if set(labels) <= set(g.guarantees))
 
     def search(self, group: Group, effort: int) -> Search:
-        return Search(self.inputs, group, self.assumptions, self.given, effort, self.seed)
+        return Search(self.inputs, group, self.assumptions, effort, self.seed)
 
 
 @same_session()
@@ -61,15 +59,12 @@ def realizable(
     assumptions: Formulas,
     guarantees: Formulas,
     *,
-    given: Given | None = None,
     effort: int = 10_000,
     seed: int = 0,
     doubtful: bool = False,
 ) -> Realizability:
     """Decides the `Question`."""
-    return _decided(
-        Question(tuple(inputs), tuple(outputs), assumptions, guarantees, given or {}, effort, seed, doubtful)
-    )
+    return _decided(Question(tuple(inputs), tuple(outputs), assumptions, guarantees, effort, seed, doubtful))
 
 
 def _decided(asked: Question) -> Realizability:
@@ -114,9 +109,7 @@ def _searched(asked: Question, group: Group, effort: int) -> Realizability:
     limit = max(CONFIRMING_EFFORT, effort)
     match answer.verdict:
         case Verdict.PROVED:
-            good = confirmed(
-                answer.proofs, asked.assumptions, group.guarantees, asked.given, effort=limit, seed=asked.seed
-            )
+            good = confirmed(answer.proofs, asked.assumptions, group.guarantees, effort=limit, seed=asked.seed)
         case Verdict.REFUTED:
             good = _refutes(asked, group, answer.inputs, limit)
         case _:  # undecided: nothing to confirm
@@ -125,8 +118,7 @@ def _searched(asked: Question, group: Group, effort: int) -> Realizability:
 
 
 def _refutes(asked: Question, group: Group, inputs: Given, limit: int) -> bool:
-    at = {**inputs, **asked.given}
-    return refutes(at, asked.assumptions, group.guarantees, group.outputs, effort=limit, seed=asked.seed)
+    return refutes(inputs, asked.assumptions, group.guarantees, group.outputs, effort=limit, seed=asked.seed)
 
 
 def _same(asked: Question, assumptions: Formulas, guarantees: Formulas) -> bool:
@@ -170,7 +162,7 @@ def _with_items(asked: Question) -> Realizability | None:
     """Decide the question with each tuple replaced by its items; None if there are none, or that does not help."""
     formulas = {(True, label): formula for label, formula in asked.assumptions.items()}
     formulas |= {(False, label): formula for label, formula in asked.guarantees.items()}
-    apart = untupled(formulas, [v for v in (*asked.inputs, *asked.outputs) if v not in asked.given])
+    apart = untupled(formulas, (*asked.inputs, *asked.outputs))
     if apart is None:
         return None
     assumed, wanted = _halves(apart.formulas)
@@ -199,7 +191,7 @@ def _with_functions(asked: Question) -> Realizability | None:
     in the original question: another output may exist there.
     """
     inputs, outputs = asked.inputs, asked.outputs
-    sequences = [v for v in (*inputs, *outputs) if isinstance(v.sort, SequenceSort) and v not in asked.given]
+    sequences = [v for v in (*inputs, *outputs) if isinstance(v.sort, SequenceSort)]
     formulas = {(True, label): formula for label, formula in asked.assumptions.items()}
     formulas |= {
         (False, label): conjunction((formula, defined(formula, [v for v in outputs if v in sequences])))

@@ -7,7 +7,7 @@ from dataclasses import field, fields
 
 from avow.base.diagnostics import Severity
 from avow.base.records import dataclass
-from avow.base.verdict import Counterexample, Outcome, Verdict, bound
+from avow.base.verdict import Counterexample, Outcome, Verdict
 from avow.formulas.values import Value
 from avow.language.printer import show_term
 from avow.language.terms import Term, Variable
@@ -37,8 +37,6 @@ class Finding:
     because: str | None = None
     """The name of the result of which this one is only a consequence."""
     engine: str = "z3"
-    bounded: bool = False
-    """The answer holds only for the scenario."""
     example: Mapping[Variable, Value] = field(default_factory=dict)
     """Values for which the claim holds, if known."""
 
@@ -83,12 +81,6 @@ class Patience:
         return max(1, int(self.full * share) // (1 if serious else 3))
 
 
-WITHIN = bound(
-    "scenario.values",
-    "scenario: inputs have the values that the plan's scenario gives them, and no others",
-)
-
-
 def as_outcome(identity: str, node: str, name: str, result: SanityResult | None) -> Outcome:
     """A result as the outcome of an obligation; None says that there is no such claim."""
     if result is None:
@@ -104,15 +96,12 @@ def as_outcome(identity: str, node: str, name: str, result: SanityResult | None)
         result.verdict,
         result.explanation or _SUMMARY[result.verdict],
         result.counterexample,
-        bound={"scenario": True} if result.bounded else {},
         details=details,
-        rests_on=(WITHIN,) if result.bounded else (),
     )
 
 
 _SUMMARY = {
     Verdict.PROVED: "proved",
-    Verdict.CHECKED: "holds within the scenario",
     Verdict.REFUTED: "does not hold",
     Verdict.UNKNOWN: "the solver could not decide it",
 }

@@ -76,13 +76,10 @@ def _ordered(some: set[Variable] | frozenset[Variable], outputs: Sequence[Variab
 class Search:
     """One group's question, with the witnesses found so far."""
 
-    def __init__(
-        self, inputs: Sequence[Variable], group: Group, assumptions: Formulas, given: Given, effort: int, seed: int
-    ) -> None:
+    def __init__(self, inputs: Sequence[Variable], group: Group, assumptions: Formulas, effort: int, seed: int) -> None:
         self.group = group
         self.assumptions = assumptions
-        self.given = given
-        self.inputs = tuple(v for v in inputs if v not in given)
+        self.inputs = tuple(inputs)
         self.granted = allowed(effort)
         self.deadline = until(effort)
         self.seed = seed
@@ -120,9 +117,7 @@ class Search:
 
     def _without_outputs(self) -> Realizability:
         goal = conjunction(self.group.guarantees.values())
-        answer = entails(
-            self.assumptions, goal, effort=self.left(), seed=self.seed, given=self.given, variables=self.inputs
-        )
+        answer = entails(self.assumptions, goal, effort=self.left(), seed=self.seed, variables=self.inputs)
         labels = tuple(self.group.guarantees)
         proofs = (self._shown(),) if answer.verdict is Verdict.PROVED else ()
         return Realizability(answer.verdict, answer.values, labels, answer.needed, answer.reason, answer.engine, proofs)
@@ -150,14 +145,13 @@ class Search:
             {**self.assumptions, label: never},
             effort=limit,
             seed=self.seed,
-            given=self.given,
             variables=self.inputs,
         )
         if answer.status == "unsat":
             needed = tuple(c for c in answer.core if c != label)
             return Realizability(Verdict.PROVED, needed=needed, proofs=(self._shown(),))
         if answer.status == "sat":
-            return self.judge({**answer.values, **self.given}, limit)
+            return self.judge(answer.values, limit)
         self.reason = answer.reason
         return None
 
@@ -182,12 +176,11 @@ class Search:
         if not allowed(limit):
             return None
         translator = Translator()
-        fixed = self._fixed(translator)
-        facts = self._defeated(translator, guarantees, fixed, few, limit)
+        facts = self._defeated(translator, guarantees, {}, few, limit)
         if limit >= WITNESS_PATIENT_EFFORT:
-            facts += [translator.term(axiom, fixed) for axiom in self.found.least]
+            facts += [translator.term(axiom) for axiom in self.found.least]
         facts += translator.background([*self.inputs, *self.found.constants])
-        tracked = [(label, translator.term(formula, fixed)) for label, formula in self.assumptions.items()]
+        tracked = [(label, translator.term(formula)) for label, formula in self.assumptions.items()]
         answer = check(translator, facts, tracked=tracked, effort=limit, seed=self.seed)
         if answer.status == "unsat":
             proof = self._shown(guarantees, self._asked(few), limit >= WITNESS_PATIENT_EFFORT)
@@ -237,9 +230,6 @@ class Search:
                 found[axiom] = left.pop(axiom)
         return list(found)
 
-    def _fixed(self, translator: Translator) -> dict[Variable, Meaning]:
-        return {variable: translator.value(value, variable.sort) for variable, value in self.given.items()}
-
     # -- refutation ----------------------------------------------------------------------------------------------------
 
     def _refute(self, limit: int) -> Realizability | None:
@@ -264,24 +254,22 @@ class Search:
     def _defeat(self, limit: int, few: int | None) -> dict[Variable, Value] | None:
         """Allowed inputs at which no known witness meets the guarantees; not yet judged."""
         translator = Translator()
-        fixed = self._fixed(translator)
         constants = [*self.inputs, *self.found.constants]
         ordinary = [v for v in constants if not isinstance(v.sort, FunctionSort)]
         functions = [v for v in constants if isinstance(v.sort, FunctionSort)]
 
         def build(meanings: Mapping[Variable, Meaning]) -> list[Expr]:
-            whole = {**fixed, **meanings}
-            facts = [translator.term(formula, whole) for formula in self.assumptions.values()]
-            return facts + self._defeated(translator, self.group.guarantees.values(), whole, few, limit)
+            facts = [translator.term(formula, meanings) for formula in self.assumptions.values()]
+            return facts + self._defeated(translator, self.group.guarantees.values(), meanings, few, limit)
 
         values = search_tables(translator, build, ordinary, functions, effort=limit, seed=self.seed)
         if values is None:
             return None
-        return {**{v: values[v] for v in self.inputs}, **self.given}
+        return {v: values[v] for v in self.inputs}
 
     def judge(self, inputs: Mapping[Variable, Value], limit: int) -> Realizability | None:
         """Is there no output at these inputs? If there is one, it becomes a witness."""
-        inputs = {v: value for v, value in inputs.items() if v in self.inputs or v in self.given}
+        inputs = {v: value for v, value in inputs.items() if v in self.inputs}
         if not replay(self.assumptions.values(), inputs, effort=limit):
             return None
         answer = solve(

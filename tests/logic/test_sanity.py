@@ -6,11 +6,10 @@ import pytest
 from helpers import some
 
 from avow.base.verdict import Verdict
-from avow.formulas.values import FunctionValue
 from avow.language.contract import Node
 from avow.sanity.analysis import analyse, outcomes
 from avow.sanity.claims import Property, claims, node_key
-from avow.sanity.results import Bounds, SanityResult
+from avow.sanity.results import SanityResult
 from avow.solving.questions import solve
 from avow.solving.replay import replay
 
@@ -273,19 +272,6 @@ def test_names_of_claims_are_unique() -> None:
         for of in case_study(system).nodes:
             names = [claim.name for claim in claims(of)]
             assert len(names) == len(set(names))
-
-
-@pytest.mark.slow
-def test_a_scenario_gives_bounded_answers_only_where_needed() -> None:
-    of = node(
-        "inputs( f : NATURAL --> NATURAL ) outputs( v : NATURAL )"
-        "| guarantee( forall(i in NATURAL | in.f(i * i * i + i) + in.f(i) <= out.v) )"
-    )
-    given = {of.input("f").variable: FunctionValue({(1,): 4}, 0)}
-    found = {r.name: r for r in analyse(of, scenario=given, bounds=Bounds(effort=300))}
-    answer = found["realizable"]
-    assert answer.verdict in {Verdict.CHECKED, Verdict.REFUTED, Verdict.UNKNOWN}
-    assert answer.bounded == (answer.verdict is Verdict.CHECKED)
 
 
 @pytest.mark.nightly
