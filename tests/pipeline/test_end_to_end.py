@@ -12,7 +12,6 @@ from pathlib import Path
 
 import pytest
 from helpers import avow
-from helpers import edit as replace
 
 
 def run(folder: Path, *command: str, env: dict[str, str] | None = None) -> subprocess.CompletedProcess[str]:
@@ -143,50 +142,6 @@ def test_again_nothing_is_run(robot: Path) -> None:
 
 
 @pytest.mark.nightly
-def test_a_comment_reruns_nothing_below_the_check(robot: Path) -> None:
-    edit(robot, "Low = 18;", "Low = 18; // a cold room\n")
-    records = len(ledger(robot))
-    done = verify(robot)
-    assert done.returncode == 0, done.stdout + done.stderr
-    assert {stage.split()[0] for stage in ran(done)} <= {"check", "export", "obligations"}
-    assert len(ledger(robot)) == records
-    # but the report shows the contract as it stands now, and agrees with it
-    assert "// a cold room" in (robot / "reports" / "thermostat" / "report.md").read_text()
-    sources = case(robot)["sources"]
-    assert isinstance(sources, list)
-    assert "// a cold room" in sources[0]["text"]
-    checked = run(robot, "avow", "report", "--check", "reports/thermostat")
-    assert checked.returncode == 0, checked.stdout
-
-
-@pytest.mark.nightly
-def test_a_threshold_breaks_what_depends_on_it_and_nothing_else(robot: Path) -> None:
-    edit(robot, "Low = 18;", "Low = 20;")
-    records = len(ledger(robot))
-    done = verify(robot)
-    assert done.returncode == 1, done.stdout + done.stderr
-    new = ledger(robot)[records:]
-    guarantees = {
-        (e["obligation"].rsplit("/", 1)[1], e["method"], e["verdict"]) for e in new if "/guarantee/" in e["obligation"]
-    }
-    assert "## warms: refuted" in (robot / "artifacts/thermostat/thermostat/index.md").read_text()
-    assert ("warms", "hoare", "refuted") in guarantees
-    assert ("warms", "hypothesis", "refuted") in guarantees
-    assert not any(
-        name == "calibrated" for name, _, _ in guarantees
-    )  # of another node: a method settles its own together
-    reading = next(e for e in new if e["verdict"] == "refuted" and e["method"] == "hoare")["counterexample"]
-    value = dict(reading["values"])["in.temperature"]
-    assert 18 <= float(value) < 20
-
-
-@pytest.mark.nightly
-def test_a_changed_program_reruns_its_method_only(robot: Path) -> None:
-    edit(robot, "// the control law", "// the law of control", "models/thermostat.imp")
-    assert {s for s in ran(verify(robot)) if s.startswith("discharge")} == {"discharge thermostat:thermostat:hoare"}
-
-
-@pytest.mark.nightly
 def test_deleted_outputs_come_back(robot: Path) -> None:
     shutil.rmtree(robot / "artifacts")
     shutil.rmtree(robot / "reports")
@@ -219,48 +174,15 @@ def test_fresh_settles_everything_anew(robot: Path) -> None:
     assert case(robot)["fresh"]
 
 
-BAD = [
-    ("system.rcl", "out.mode == heat", "out.mode = heat", r"system\.rcl:\d+:\d+", "=="),
-    ("system.rcl", "mode : Mode", "mode : Mood", r"system\.rcl:\d+:\d+", "Mode"),
-    ("system.rcl", "in.temperature < Low", "in.temprature < Low", r"system\.rcl:\d+:\d+", "temperature"),
-    ("plan.yaml", "thermostat.warms", "thermostat.warmz", r"plan\.yaml:\d+:\d+", "warms"),
-    ("plan.yaml", "models/thermostat.imp", "models/thermostatt.imp", r"plan\.yaml:\d+:\d+", "thermostatt.imp"),
-    ("plan.yaml", "hoare:", "hoar:", r"", "hoare"),
-    ("plan.yaml", "criticality: high", "criticality: hihg", r"plan\.yaml:\d+:\d+", "high"),
-    ("models/thermostat.imp", "mode := heat", "mode := hot", r"thermostat\.imp:\d+:\d+", "hot"),
-]
-"""File, text in it, the slip in its place, where it is to be located, and a word of the message."""
-
-
-@pytest.mark.nightly
-def test_every_bad_input_is_located_in_one_run(made: Path, tmp_path: Path) -> None:
-    shutil.copy(made / "dodo.py", tmp_path)
-    for number, (name, old, new, _, _) in enumerate(BAD):
-        folder = tmp_path / "contracts" / f"bad{number}"
-        shutil.copytree(made / "contracts" / "thermostat", folder)
-        replace(folder / "plan.yaml", ("system: thermostat", f"system: bad{number}"))
-        replace(folder / name, (old, new))
-    done = verify(tmp_path)
-    text = done.stdout + done.stderr
-    assert done.returncode == 2, text
-    assert "Traceback" not in text
-    messages = re.split(r"^(?=error)", text, flags=re.MULTILINE)
-    for number, (_, _, _, where, what) in enumerate(BAD):
-        assert re.search(rf"^bad{number} +not done", text, re.MULTILINE), text
-        place = rf"bad{number}/(models/)?{where}" if where else ""
-        assert any(re.search(place, message) and what in message for message in messages), text
-
-
 def test_bad_input_is_located_and_ends_with_2(begun: Path, tmp_path: Path) -> None:
     robot = Path(shutil.copytree(begun, tmp_path / "robot"))
-    name, old, new, where, what = BAD[4]
-    edit(robot, old, new, name)
+    edit(robot, "models/thermostat.imp", "models/thermostatt.imp", "plan.yaml")
     done = verify(robot)
     text = done.stdout + done.stderr
     assert done.returncode == 2, text
     assert "Traceback" not in text
-    assert re.search(where, text), text
-    assert what in text, text
+    assert re.search(r"plan\.yaml:\d+:\d+", text), text
+    assert "thermostatt.imp" in text, text
 
 
 @pytest.mark.parametrize("how", ["a copy", pytest.param("a link", marks=pytest.mark.slow)])
