@@ -15,6 +15,7 @@ from helpers import alive, wait_for
 
 from avow.backend_kit.protocol import Limits, Report
 from avow.base import process
+from avow.base.tuning.running import WALL
 from avow.base.verdict import Outcome, Verdict
 from avow.base.workspace import Workspace
 from avow.pipeline import dispatch, processes
@@ -130,7 +131,7 @@ def test_a_work_that_hangs_is_killed_with_all_that_it_started(
 ) -> None:
     (odd / "pids").unlink(missing_ok=True)
     for limit in (1.0, 4.0, 16.0, 64.0):  # until the work gets far enough to hang, on a busy machine
-        monkeypatch.setattr(processes, "WORKER_GRACE", limit - 2 * Limits().seconds)
+        monkeypatch.setattr(processes, "WORKER_GRACE", limit - (WALL + 1) * Limits().seconds)
         outcome, _ = settle(odd, "hangs")
         assert outcome.verdict is Verdict.UNKNOWN
         assert "no answer within" in outcome.summary
