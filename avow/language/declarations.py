@@ -21,7 +21,7 @@ from avow.language.foreign import FOREIGN_TYPES
 from avow.language.lexer import Token
 from avow.language.scope import Defined, Environment, Scope
 from avow.language.source import Reports, Source
-from avow.language.subterms import subterms
+from avow.language.subterms import distinct_parts
 from avow.language.terms import EnumValue, Quantified, Role, SetTerm, Variable
 
 
@@ -176,7 +176,7 @@ class Declarations:
             return
         term = Checker(Scope(environment), declared.reports).term(value)
         environment.broken.update(tree.text for tree in fresh)
-        if term is not None and any(isinstance(part, Quantified) for part in subterms(term)):
+        if term is not None and any(isinstance(part, Quantified) for part in distinct_parts(term)):
             message = "a constant is a value: no quantifier stands in it"
             declared.reports.error("RCL220", message, value.start, value.end, hint="write the formula where it is used")
             term = None

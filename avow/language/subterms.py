@@ -17,6 +17,18 @@ def subterms(term: Term) -> Iterator[Term]:
         stack.extend(reversed(current.children))
 
 
+def distinct_parts(term: Term) -> Iterator[Term]:
+    """The term and everything in it; a part that is shared, as the value of a constant is, comes once."""
+    met: set[int] = set()
+    stack = [term]
+    while stack:
+        current = stack.pop()
+        if id(current) not in met:
+            met.add(id(current))
+            yield current
+            stack.extend(current.children)
+
+
 @by_identity(50_000)
 def histories(term: Term) -> tuple[History, ...]:
     """The subterms that refer to other steps than this one, in reading order; empty for a term of one step."""

@@ -33,6 +33,7 @@ def row(count: int, first: str, form: str, last: str = "") -> str:
 @pytest.mark.parametrize(
     ("context", "sort", "formula"),
     [
+        (row(60, "C0 = 1;", "C{0} = C{1} + C{1};"), "REAL", "o or C59 > 1"),
         (row(400, "C0 = 1;", "C{0} = -(C{1});"), "REAL", "o or C399 > 1"),
         (row(4000, "", "C{1} = C{0} + 1;", "C3999 = 1;"), "REAL", "o or C0 > 1"),
         (row(4000, "", "T{1} : T{0};", "T3999 : REAL;"), "T0", "o"),
