@@ -279,19 +279,12 @@ class Baseline:
     content: str
     """Digest of the signed case's content."""
     verdict: str
-    requirements: tuple[tuple[str, str, str, str], ...]
-    """(id, digest of its words and formula, how, formula)."""
-    guarantees: tuple[tuple[str, str, str, str, str], ...]
-    """(id, digest of its meaning, status, formula, mark of the records that count)."""
-    assumptions: tuple[tuple[str, str, str], ...]
-    """(key, words, until)."""
-    deficits: tuple[tuple[str, int], ...]
+    items: tuple[tuple[str, str, str, tuple[str, ...]], ...]
+    """(kind of subject, subject, name, value) of everything that is compared (`avow.assurance.state`)."""
+    sources: tuple[tuple[str, str], ...]
+    """Contracts and plan as signed: (path, text)."""
     checked: str = ""
     """How its signature was verified, in words."""
-    hazards: tuple[tuple[str, str, str], ...] = field(default=(), metadata=LATER)
-    """(id, meaning, level)."""
-    gates: tuple[tuple[str, str, bool], ...] = field(default=(), metadata=LATER)
-    """(id, title, whether it passed) of the gates that were asked. Empty: signed before hazards and gates were."""
     says: str = field(default="", metadata=LATER)
     """The sentence that was signed, of a signature that was read."""
 
@@ -301,17 +294,15 @@ class ChangeLine:
     """One change since the signed report, worst kinds first."""
 
     kind: str
-    """``open``, ``weaker``, ``gone``, ``meaning``, ``assumption``, ``expired``, ``deficit``, ``better``."""
+    """One of `avow.assurance.changes.KINDS`."""
     subject: str
     words: str
     before: str = ""
     after: str = ""
     edits: tuple[str, ...] = field(default=(), metadata=LATER)
-    """For a requirement: the changes below it."""
-
-    @property
-    def worse(self) -> bool:
-        return self.kind != "better"
+    """The edits and the changes below it that may be the reason."""
+    about: str = field(default="", metadata=LATER)
+    """The kind of subject."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -36,7 +36,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from datetime import date
 
-from avow.assurance.answers import EARLIER
+from avow.assurance.answers import EARLIER, Changes
 from avow.assurance.assumptions import Statements, assumptions
 from avow.assurance.certification import Grade, ProofView, proof_views, standing, trusted_base
 from avow.assurance.changes import changes
@@ -162,7 +162,6 @@ def conclude(facts: Facts) -> Case:
     )
     single = _single(views)
     weakened = deficits(views, requirements, supposed, listed, findings, relied, single, hazards, missing_tools(facts))
-    changed = changes(facts.baseline, requirements, views, supposed, weakened, hazards, found)
     basis = {n for c in closed.values() for n in c.claims} if closed else set(whole.claims)
     basis |= {n for h in hazards for n in h.closure}
     weakest = weakest_of(basis, by_id, relied, titles)
@@ -182,7 +181,6 @@ def conclude(facts: Facts) -> Case:
         supposed,
         weakened,
         found,
-        changed,
         weakest,
         following,
         trust_lines(proofs, facts.kernel, supposed, views, facts.run.id),
@@ -209,7 +207,7 @@ def conclude(facts: Facts) -> Case:
         requirements=requirements,
         assumptions=supposed,
         deficits=weakened,
-        changes=changed,
+        changes=Changes(""),
         open_items=listed,
         nodes=facts.nodes,
         obligations=views,
@@ -232,6 +230,7 @@ def conclude(facts: Facts) -> Case:
         earlier=facts.earlier,
         left_out=facts.left_out,
     )
+    case = replace(case, changes=changes(case))
     return replace(case, answers=with_signature(case))
 
 

@@ -63,6 +63,8 @@ _WORDS = {
 
 _LEAST = {"catastrophic": "high", "critical": "high", "marginal": "medium", "negligible": "low"}
 """A hazard's severity (MIL-STD-882E, table I) → the least criticality of the nodes that its mitigations rest on."""
+SEVERITIES = tuple(_LEAST)
+"""Worst first."""
 
 
 def of_deficits(kinds: int) -> str:

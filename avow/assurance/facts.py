@@ -153,7 +153,7 @@ def facts_of_system(
         baseline=baseline,
         kernel=kernel or KernelRun(),
         left_out=sum(e.hash not in kept for e in held),
-        hazards=tuple(replace(h, span=_relative(h.span, plan)) for h in plan.hazards),
+        hazards=tuple(replace(h, span=_relative(h.span, plan), mitigation_spans=()) for h in plan.hazards),
     )
 
 

@@ -22,7 +22,7 @@ from avow.assurance.answers import (
     TrustLine,
     WeakestEvidence,
 )
-from avow.assurance.changes import MARKS, is_signed
+from avow.assurance.changes import MARKS
 from avow.assurance.deficits import briefly, of_deficits
 from avow.assurance.model import Case, Gate, NodeView, ObligationView, RequirementView
 from avow.assurance.naming import cut
@@ -104,7 +104,6 @@ def answers(
     assumptions: Sequence[Assumption],
     deficits: Sequence[Deficit],
     gates: Sequence[Gate],
-    changes: Changes,
     weakest: WeakestEvidence | None,
     following: WeakestEvidence | None,
     trusted: tuple[TrustLine, ...],
@@ -112,7 +111,7 @@ def answers(
     strict: bool,
     passed: bool,
 ) -> Answers:
-    """The content of the first screen, except the signature."""
+    """The content of the first screen, except the signature and what changed since."""
     number = Counter(r.level for r in requirements)
     headline, verdict, tone = _verdict(requirements, gates, strict=strict, passed=passed)
     unrun = next((d.count for d in deficits if d.key == "programs"), 0)
@@ -161,8 +160,8 @@ def answers(
         refuted=_refuted(requirements, views, nodes),
         supposed=tuple(_lines(assumptions)),
         owned=f"{owned} of {len(assumptions)}" if assumptions else "",
-        changed_against=f"Against the report signed by {changes.against}:" if changes.against else "",
-        changed=_changed(changes),
+        changed_against="",
+        changed=(),
         signed="not signed",
         statement=_statement(f"{verdict} ({warned})" if warned else verdict, assumptions, kinds),
         warned=warned,
@@ -329,12 +328,12 @@ def _owners(assumptions: Sequence[Assumption]) -> str:
 def _changed(changes: Changes) -> tuple[tuple[str, str], ...]:
     if not changes.against:
         return (("", "None has been signed."),)
-    edits = [e for e in changes.entries if e.kind == "meaning"][:1]  # the cause before what came of it
+    edits = [e for e in changes.entries if e.kind in ("edit", "meaning")][:1]  # the cause before what came of it
     ordered = [*edits, *(e for e in changes.entries if e not in edits)]
     shown = [(MARKS.get(e.kind, "▼"), e.words) for e in ordered]
     if len(shown) > LINES:
         left = ordered[LINES - 1 :]
-        better = sum(not e.worse for e in left)
+        better = sum(e.kind == "better" for e in left)
         shown = [*shown[: LINES - 1], ("…", f"{len(left)} more" + (f", {better} of them better" if better else ""))]
     if not shown:
         shown = [("=", "Nothing.")]
@@ -343,23 +342,26 @@ def _changed(changes: Changes) -> tuple[tuple[str, str], ...]:
 
 
 def with_signature(case: Case) -> Answers:
-    """The answers, with the signature line (the signer, and whether the case is still the signed one), and of a signed
-    case the sentence that was signed."""
-    signed, said = _signed(case), case.baseline.says if case.baseline else ""
+    """The answers, with the changes since the last signature, the signature line (the signer, and whether the case is
+    still the signed one), and of a signed case the sentence that was signed."""
+    signed, said, against = _signed(case), case.baseline.says if case.baseline else "", case.changes.against
     kept = said if signed.startswith("signed") and said else case.answers.statement
-    return replace(case.answers, signed=signed, statement=kept)
+    head = f"Against the report signed by {against}:" if against else ""
+    return replace(case.answers, signed=signed, statement=kept, changed_against=head, changed=_changed(case.changes))
 
 
 def _signed(case: Case) -> str:
     if (baseline := case.baseline) is None:
         return "not signed"
-    same = is_signed(case, baseline)
+    same = not case.changes.entries and case.answers.verdict == baseline.verdict
     if same and baseline.until and baseline.until < case.today:
         return f"not signed; what {baseline.who} signed on {baseline.signed_on} stood until {baseline.until}"
     until = f" until {baseline.until}" if baseline.until else ""
     if same:
         return f"signed by {baseline.who} on {baseline.signed_on}{until}"
-    return f"not signed; changed since {baseline.who} signed on {baseline.signed_on}"
+    edits = (e.subject.rpartition("/")[2].partition(":")[0] for e in case.changes.entries if e.kind == "edit")
+    since = f"; since then: {listed(names, 2)}" if (names := list(dict.fromkeys(edits))) else ""
+    return f"not signed: {baseline.who} signed another state on {baseline.signed_on}{since}"
 
 
 def _statement(verdict: str, assumptions: Sequence[Assumption], kinds: int) -> str:

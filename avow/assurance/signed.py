@@ -9,13 +9,13 @@ from pathlib import Path
 from typing import Any
 
 from avow.assurance.answers import Baseline
-from avow.assurance.changes import baseline_of, content_of
 from avow.assurance.model import Case
+from avow.assurance.state import baseline_of, content_of
 from avow.base.codec import Unreadable, from_json, to_json
 from avow.base.files import digest_file, read_regular, write
 from avow.evidence.envelope import Opened, seal, unseal
 
-PREDICATE = "https://avow.invalid/signed-case/v2"
+PREDICATE = "https://avow.invalid/signed-case/v3"
 KEYS = "keys"
 """In ``signed/``: public keys (``*.pub``). If there are any, only a signature by one of them is a baseline."""
 
@@ -76,7 +76,7 @@ def read_signed(path: Path) -> Baseline | str:
         return opened
     predicate = opened.statement.get("predicate")
     if opened.statement.get("predicateType") != PREDICATE or not isinstance(predicate, dict):
-        return "it is no signature of a case"
+        return "it is no signature of a case in this version's form: sign again"
     try:
         found = from_json(Baseline, predicate.get("baseline"))
     except Unreadable as error:

@@ -8,9 +8,11 @@ from pathlib import Path
 
 import click
 
+from avow.assurance.answers import ChangeLine
+from avow.assurance.changes import MARKS, compare, is_worse
 from avow.assurance.codec import read_case
-from avow.assurance.compare import Change, Snapshot, compare, of_case, of_ledger, of_signature
 from avow.assurance.signed import KEYS, newest_signed, read_signed
+from avow.assurance.state import State, state_of, state_of_ledger, state_of_signature
 from avow.base import git
 from avow.base.codec import document, to_json
 from avow.base.diagnostics import Diagnostic, Rejected
@@ -34,10 +36,10 @@ from avow.pipeline.workload import survey
     type=click.Choice(["worse", "never"]),
     default="worse",
     show_default=True,
-    help="Exit code 1 where less is shown or more assumed than before, or never.",
+    help="Exit code 1 where less is shown or asked, or more assumed, than before; or never.",
 )
 def command(old: str, new: str | None, as_json: bool, page: Path | None, fail_on: str) -> int:
-    """What changed from OLD to NEW: each requirement (was, is, which edit), then claims, gates and what was re-run.
+    """What changed from OLD to NEW, the worst first, with the edits that may be the reason, and what was re-run.
 
     Each is a report (its folder or report.json), a folder of reports, a ledger (.jsonl), a signature (signed/, a folder
     or file in it), another workspace, or a git revision of this one: then the contracts and plans of that revision are
@@ -47,7 +49,7 @@ def command(old: str, new: str | None, as_json: bool, page: Path | None, fail_on
     if page is not None:
         _write(page, old, new, changes)
     if as_json:
-        listed = [{"system": system, "worse": change.is_worse, **to_json(change)} for system, change in changes]
+        listed = [{"system": system, "worse": is_worse(change), **to_json(change)} for system, change in changes]
         click.echo(document({"changes": listed}))
     elif not changes:
         click.echo("nothing changed")
@@ -55,24 +57,25 @@ def command(old: str, new: str | None, as_json: bool, page: Path | None, fail_on
         for system in dict.fromkeys(s for s, _ in changes):
             click.echo(f"{system}:")
             _tell([change for s, change in changes if s == system])
-    return 1 if fail_on == "worse" and any(change.is_worse for _, change in changes) else 0
+    return 1 if fail_on == "worse" and any(is_worse(change) for _, change in changes) else 0
 
 
-def _tell(changes: list[Change]) -> None:
+def _tell(changes: list[ChangeLine]) -> None:
     for change in changes:
         if change.kind != "rerun":
-            click.echo(f"  {change.text}")
-            if change.old_formula != change.new_formula:
-                click.echo(f"      was: {change.old_formula}")
-                click.echo(f"      now: {change.new_formula}")
-            for line in change.why[:DIFF_REASONS]:
+            click.echo(f"  {MARKS.get(change.kind, '▼')} {change.words}")
+            if change.kind == "meaning" and change.before not in change.words:
+                click.echo(f"      was: {change.before}")
+                click.echo(f"      now: {change.after}")
+            more = len(change.edits) - DIFF_REASONS
+            for line in (*change.edits[:DIFF_REASONS], *([f"and {more} more"] if more > 0 else ())):
                 click.echo(f"      {line}")
-    again = [change for change in changes if change.kind == "rerun"]
+    again = sum(change.kind == "rerun" for change in changes)
     if again:
-        click.echo(f"  re-run, with the same verdict: {count(len(again), 'claim')}")
+        click.echo(f"  {MARKS['rerun']} re-run, with the same answer: {count(again, 'piece')} of evidence")
 
 
-def _write(page: Path, old: str, new: str | None, changes: list[tuple[str, Change]]) -> None:
+def _write(page: Path, old: str, new: str | None, changes: list[tuple[str, ChangeLine]]) -> None:
     """Raises Rejected if the page cannot be written."""
     from avow.report.comparison import render_comparison
 
@@ -83,32 +86,32 @@ def _write(page: Path, old: str, new: str | None, changes: list[tuple[str, Chang
         raise Rejected(Diagnostic("DIFF002", f"{page} cannot be written: {error.strerror}")) from None
 
 
-def _pair(old: str, new: str | None) -> Iterator[tuple[str, Snapshot, Snapshot]]:
+def _pair(old: str, new: str | None) -> Iterator[tuple[str, State, State]]:
     """(system, before, after) for every system that either side has. Raises Rejected."""
     before, after = _snapshots(old), _snapshots(new)
     if len(before) == len(after) == 1:  # two reports of one system may have different names
         (name, one), (_, other) = next(iter(before.items())), next(iter(after.items()))
         yield name, one, other
         return
-    nothing = Snapshot("", {}, {})
+    nothing = State()
     for name in dict.fromkeys((*before, *after)):
         if Path(old).exists() and name not in before:
             continue  # one report or ledger compared with the whole workspace: only its own system counts
         yield name, before.get(name, nothing), after.get(name, nothing)
 
 
-def _snapshots(name: str | None) -> dict[str, Snapshot]:
+def _snapshots(name: str | None) -> dict[str, State]:
     """System → its snapshot, from a report, a ledger, a revision, or (None) the workspace as it is. Raises Rejected."""
     path = Path(name) if name is not None else None
     if path is not None and path.exists() and (found := _of_signatures(path)):
         return found
     if path is not None and path.suffix == ".jsonl" and path.is_file():
-        return {path.stem: of_ledger(path.stem, _records(path))}
+        return {path.stem: state_of_ledger(_records(path))}
     if path is not None and (path.is_file() or (path / "report.json").is_file()):
         case = read_case(path)
-        return {case.system: of_case(case)}
+        return {case.system: state_of(case)}
     if path is not None and (reports := sorted(path.glob("*/report.json"))):
-        return {case.system: of_case(case) for case in map(read_case, reports)}
+        return {case.system: state_of(case) for case in map(read_case, reports)}
     if path is not None and (path / "contracts").is_dir():
         return _of_contracts(Workspace(path), Workspace(path))
     place = workspace()
@@ -119,7 +122,7 @@ def _snapshots(name: str | None) -> dict[str, Snapshot]:
         return _of_contracts(Workspace(Path(folder)), place)
 
 
-def _of_signatures(path: Path) -> dict[str, Snapshot]:
+def _of_signatures(path: Path) -> dict[str, State]:
     """The snapshots of the newest valid signatures in ``signed/`` or a system's folder in it, or of a file there.
     Raises Rejected."""
     path = path.resolve()
@@ -131,7 +134,7 @@ def _of_signatures(path: Path) -> dict[str, Snapshot]:
         read = {f.name: newest_signed(f.parent, f.name)[0] or "no signature counts" for f in folders if f.name != KEYS}
     if faults := [f"{path}: {name}: {why}" for name, why in read.items() if isinstance(why, str)]:
         raise Rejected(*(Diagnostic("DIFF001", fault) for fault in faults))
-    return {name: of_signature(name, found) for name, found in read.items() if not isinstance(found, str)}
+    return {name: state_of_signature(found) for name, found in read.items() if not isinstance(found, str)}
 
 
 def _records(path: Path) -> tuple[Entry, ...]:
@@ -149,14 +152,14 @@ def _checkout(place: Workspace, revision: str, folder: Path) -> None:
         raise Rejected(Diagnostic("DIFF001", message)) from None
 
 
-def _of_contracts(contracts: Workspace, place: Workspace) -> dict[str, Snapshot]:
+def _of_contracts(contracts: Workspace, place: Workspace) -> dict[str, State]:
     found = {}
     for folder in contracts.systems():
         surveyed = survey(folder)
         if isinstance(surveyed, Rejected):
-            found[folder.name] = Snapshot(folder.name, {}, {})
+            found[folder.name] = State()
             continue
         with readable(place.ledger(surveyed.system.name)):
             case = as_it_is(surveyed, contracts, place.ledger(surveyed.system.name))
-        found[case.system] = of_case(case)
+        found[case.system] = state_of(case)
     return found

@@ -12,7 +12,7 @@ from avow.base.codec import document
 from avow.base.workspace import ON_DEMAND, find_workspace, report_folder, require_systems, workspace
 from avow.cli.options import PathArgument, json_option
 from avow.evidence.ledger import Ledger
-from avow.pipeline.report_check import check, stale
+from avow.pipeline.report_check import check, signed_now, stale
 from avow.pipeline.settings import sign_with
 from avow.pipeline.state import task_name
 from avow.pipeline.tasks import execute
@@ -66,10 +66,17 @@ def _check(folder: Path, as_json: bool) -> int:
     ledger = Ledger(path) if path is not None and path.exists() else None
     found = check(folder, ledger, place.root if place else None)
     old = stale(case, place.root) if place else ()
+    signed = signed_now(case, place.root) if place else case.answers.signed
     if as_json:
         click.echo(
             document(
-                {"system": case.system, "agrees": not found, "differences": list(found), "changed_since": list(old)}
+                {
+                    "system": case.system,
+                    "agrees": not found,
+                    "differences": list(found),
+                    "changed_since": list(old),
+                    "signed": signed,
+                }
             )
         )
     elif found:
@@ -82,6 +89,8 @@ def _check(folder: Path, as_json: bool) -> int:
         told = f"{records} records{left_out}, {len(case.obligations)} obligations, proofs {case.grade.word}"
         told += f"; {case.answers.warned}" if case.answers.warned else ""
         click.echo(f"{folder}: agrees with the ledger: {told}{', of an earlier state' if old else ''}")
+    if not as_json:
+        click.echo(f"  · {signed}")
     for name in old if not as_json else ():
         click.echo(f"  · {name} has changed since: run `avow verify` to update its evidence")
     return 1 if found else 0

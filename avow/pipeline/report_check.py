@@ -12,13 +12,15 @@ cannot know whether the obligations are still those of today's contract: `avow v
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from pathlib import Path
 
-from avow.assurance.case import conclude_again
+from avow.assurance.case import conclude, conclude_again
 from avow.assurance.codec import from_json, to_json
+from avow.assurance.facts import facts_of_case
 from avow.assurance.history import kept_records
 from avow.assurance.model import Case
-from avow.assurance.signed import KEYS
+from avow.assurance.signed import KEYS, newest_signed, read_signed
 from avow.base import codec
 from avow.base.codec import Unreadable
 from avow.base.diagnostics import Rejected
@@ -53,7 +55,7 @@ def check(folder: Path, ledger: Ledger | None, root: Path | None = None) -> tupl
     found = [*_conclusions(case), *_texts(case), *_formats(case, folder, keys), *_recounted(folder)]
     found += [_NO_LEDGER] if ledger is None else _ledger(case, ledger, root)
     if root is not None:
-        found += [*_sources(case, root), *_kernel(case, root)]
+        found += [*_sources(case, root), *_signature(case, root), *_kernel(case, root)]
     elif case.kernel.established:
         found.append("the contracts are not here: what the kernel established cannot be established again")
     return tuple(found)
@@ -251,6 +253,18 @@ def _kernel(case: Case, root: Path) -> Iterable[str]:
                 yield f"report.json: the kernel does not establish {told.obligation} from the certificate in it"
             elif found.solvers < told.solvers and solvers.second is not None:
                 yield f"report.json: {told.obligation}: {found.solvers} of {told.solvers} solvers answer"
+
+
+def _signature(case: Case, root: Path) -> Iterable[str]:
+    """The signature that the report is compared with, against the file."""
+    if (said := case.baseline) is not None and read_signed(root / "signed" / case.system / said.name) != said:
+        yield f"the report names a signature of {said.who} that is not, or not so, in signed/{case.system}/{said.name}"
+
+
+def signed_now(case: Case, root: Path) -> str:
+    """Whether the newest signature is of this case, in the words of the report's head."""
+    newest = newest_signed(root / "signed", case.system)[0]
+    return conclude(replace(facts_of_case(case), baseline=newest)).answers.signed
 
 
 def _sources(case: Case, root: Path) -> Iterable[str]:

@@ -248,18 +248,29 @@ def _change(facts: Facts, match: re.Match[str], _block: Block) -> _Numbers:
         texts = {" ".join(filter(None, (e["words"], name, *e.get("edits", ())))) for name in ("", claim)}
         if row[1] in texts and [row[0], *row[2:]] == [e["kind"], e["before"], e["after"]]:
             least, most = (e["kind"] == "deficit" and facts.deficit(e["subject"])) or (0, math.inf)
-            signed = dict(facts.case["baseline"]["deficits"]).get(e["subject"], 0)
-            if e["kind"] != "deficit" or (int(row[2]) == signed and least <= int(row[3]) <= most):
+            items = facts.case["baseline"]["items"]
+            signed = next(
+                (int(value[0]) for kind, key, _, value in items if (kind, key) == ("deficit", e["subject"])), 0
+            )
+            if e["kind"] != "deficit" or (int(row[2] or 0) == signed and least <= int(row[3]) <= most):
                 return match.groups()
     return "no such change", *match.groups()[1:]
 
 
 def _rest(facts: Facts, _match: re.Match[str], _block: Block) -> _Numbers:
     """The changes that the screen counts only: the first edit and the next worst change are in words."""
-    edits = [e for e in facts.changes if e["kind"] == "meaning"][:1]
+    edits = [e for e in facts.changes if e["kind"] in ("edit", "meaning")][:1]
     left = [e for e in facts.changes if e not in edits][2 - len(edits) :]
     better = sum(e["kind"] == "better" for e in left)
     return str(len(left)), str(better) if better else None
+
+
+def _since(facts: Facts, match: re.Match[str], _block: Block) -> _Numbers:
+    """The files that were edited since the signature, by their names."""
+    edits = [str(e["subject"]) for e in facts.changes if e["kind"] == "edit"]
+    names = list(dict.fromkeys(name.rpartition("/")[2].partition(":")[0] for name in edits))
+    shown = len(match[1].split(", "))
+    return ", ".join(names[:shown]), str(len(names) - shown) if len(names) > shown else None
 
 
 def _policy(facts: Facts, match: re.Match[str], _block: Block) -> _Numbers:
@@ -304,6 +315,7 @@ RULES = (
     _rule("", r"WARNED: (\d+) findings? known", _whole(Facts.known)),
     _rule("", r"(\d+) kinds? of assurance deficit", _kinds),
     _rule("head", r"Refuted: ([^␟]*?)(?: and (\d+) more)?(?=; | $| · |[ ,] ?\d| WARNED)", _listed),
+    _rule("head", r"; since then: ([^␟]*?)(?: and (\d+) more)?(?= ␟| $)", _since),
     _rule("q6", r"All (\d+) kinds?", _kinds),
     _rule(
         "head",

@@ -11,10 +11,10 @@ from urllib.parse import quote
 from markupsafe import Markup
 
 from avow.assurance.answers import MEANINGS, Assumption, Level, NodeBasis, SupposedLine, Tone
-from avow.assurance.changes import baseline_of
 from avow.assurance.first_screen import basis_of
 from avow.assurance.model import Case, ObligationView
 from avow.assurance.relied import kept_apart, shade
+from avow.assurance.state import baseline_of
 from avow.base.plain import count, listed
 from avow.base.tuning.shown import NODE_BOXES, SHEET_LETTERS
 from avow.evidence.record import Evidence

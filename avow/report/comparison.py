@@ -1,64 +1,35 @@
-"""Two states of a case compared on a page: what was lost, gained and re-run, and why. Styled as the report."""
+"""Two states of a case compared on a page, with the same changes as the terminal and the report have. Styled as the
+report."""
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Sequence
 
-from avow.assurance.compare import ORDER, Change
+from avow.assurance.answers import ChangeLine
+from avow.assurance.changes import MARKS, is_worse
 from avow.base.tuning.shown import CHANGES_UNFOLDED
-from avow.evidence.status import Status
 from avow.report.page import fill
 
-_KINDS = {
-    "requirement": ("Requirements and hazards: what each was and is, and the edit", "requirements and hazards", ""),
-    "gate": ("Gates of the policy", "of the gates changed", ""),
-    "worse": ("Lost: claims that stand worse", "worse", "bad"),
-    "removed": ("Gone: claims that are not made any more", "gone", "open"),
-    "assumption": ("Assumed now, without being shown", "assumed now", "open"),
-    "meaning": ("Changed meaning: another claim under the same name", "changed meaning", "open"),
-    "added": ("New claims", "new", "fair"),
-    "better": ("Gained: claims that stand better", "better", "good"),
-    "rerun": ("Re-run, with the same verdict", "re-run", "plain"),
-}
-"""For each kind its heading, the word after its number, and its colour (empty: computed from the changes)."""
 
-
-def render_comparison(old: str, new: str, changes: Sequence[tuple[str, Change]]) -> str:
+def render_comparison(old: str, new: str, changes: Sequence[tuple[str, ChangeLine]]) -> str:
     """The page. `old` and `new` are the two states as the reader named them; each of `changes` comes with its
     system."""
-    systems = {}
-    for system in dict.fromkeys(name for name, _ in changes):
-        mine = [change for name, change in changes if name == system]
-        systems[system] = [(kind, [c for c in mine if c.kind == kind]) for kind in ORDER]
-    counts = Counter(change.kind for _, change in changes)
-    lost = sum(c.is_worse and c.kind != "removed" for _, c in changes)
+    worse = sum(is_worse(change) for _, change in changes)
     return fill(
         "compare.html.j2",
         old=old,
         new=new,
-        line=_line(counts, lost),
-        banner="bad" if lost else "open" if counts["removed"] or counts["meaning"] else "good",
-        systems=systems,
-        counts=[(kind, counts[kind], _KINDS[kind][1], _tone(kind, changes)) for kind in ORDER if counts[kind]],
-        headings={kind: heading for kind, (heading, _, _) in _KINDS.items()},
-        known={status.value for status in Status},
+        line=_line(changes, worse),
+        banner="bad" if worse else "open" if any(c.kind in ("edit", "meaning") for _, c in changes) else "good",
+        systems={name: [c for n, c in changes if n == name] for name in dict.fromkeys(name for name, _ in changes)},
+        marks=MARKS,
         folded=CHANGES_UNFOLDED,
     )
 
 
-def _line(counts: Counter[str], lost: int) -> str:
-    if not counts:
+def _line(changes: Sequence[tuple[str, ChangeLine]], worse: int) -> str:
+    if not changes:
         return "Nothing changed."
-    if set(counts) == {"rerun"}:
-        return "Asked again; every verdict is the same."
-    if lost:
-        return f"{lost} {'thing stands' if lost == 1 else 'things stand'} worse than before."
-    if counts["removed"] or counts["meaning"]:
-        return "Nothing stands worse, but some claims are gone or mean something else."
-    return "Nothing stands worse than before."
-
-
-def _tone(kind: str, changes: Sequence[tuple[str, Change]]) -> str:
-    worse = any(c.is_worse for _, c in changes if c.kind == kind)
-    return _KINDS[kind][2] or ("bad" if worse else "good")
+    if all(change.kind == "rerun" for _, change in changes):
+        return "Re-run; every answer is the same."
+    return f"{worse} of {len(changes)} changes are for the worse." if worse else "Nothing is worse than before."

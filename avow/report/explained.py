@@ -7,10 +7,10 @@ from collections.abc import Iterable, Iterator
 from itertools import islice
 
 from avow.assurance import answers
-from avow.assurance.changes import baseline_of
 from avow.assurance.codec import to_json
 from avow.assurance.model import Case
 from avow.assurance.naming import short
+from avow.assurance.state import baseline_of
 from avow.base.files import sha256
 from avow.base.plain import listed
 from avow.base.tuning.shown import RECORDS

@@ -10,9 +10,9 @@ from itertools import chain
 from typing import Any
 
 from avow.assurance.answers import Assumption, SupposedLine
-from avow.assurance.changes import baseline_of
 from avow.assurance.model import Case, ObligationView, RequirementView, SourceView
 from avow.assurance.naming import short
+from avow.assurance.state import baseline_of
 from avow.backend_kit.timeline import in_words, picture, timelines
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.plain import listed

@@ -6,7 +6,9 @@ import shutil
 from pathlib import Path
 
 import pytest
-from helpers import avow
+from helpers import avow, edit, some
+
+from avow.assurance.codec import read_case
 
 FILES = {
     "dodo.py": "",
@@ -61,3 +63,43 @@ def test_nothing_changed_after_signing(signed: Path) -> None:
     for old in ("signed", "reports/s"):
         done = avow("diff", old, cwd=signed)
         assert (done.returncode, done.stdout) == (0, "nothing changed\n")
+
+
+EDITS = [
+    ("plan.yaml", "cases: 20", "cases: 1", "≠ policy, guarantees.medium.cases: 20 → 1", 1),
+    ("plan.yaml", "[tested]", "[tested, justified]", "≠ policy, guarantees.medium.one_of: also justified", 1),
+    ("plan.yaml", "cases: 40}}]}\n  m", "cases: 30}}]}\n  m", "▼ n.g by hypothesis: tested (model), 40 judged", 1),
+    ("plan.yaml", "n: {criticality: medium", "n: {criticality: low", "≠ node n, criticality: medium → low", 1),
+    ("plan.yaml", "nodes:", "# why\nnodes:", "≠ contracts/s/plan.yaml:11: (nothing) → # why", 0),
+    ("models/n.py", "min(x, 1)", "min(1, x)", "≠ contracts/s/models/n.py changed: 1 claim re-run, same verdict", 0),
+    ("n.rcl", "Top = 1", "Top = 2", "≠ contracts/s/n.rcl:1: context { Top = 1; } → context { Top = 2; }", 1),
+    ("hazards.yaml", "severity: critical", "severity: marginal", "≠ hazard H1, severity: critical → marginal", 1),
+    ("hazards.yaml", "[R, n.g]", "[R]", "▼ hazard H1, mitigated by: without n.g", 1),
+]
+
+
+@pytest.mark.parametrize(("name", "old", "new", "line", "code"), some(EDITS, 1, len(EDITS) - 1))
+def test_an_edit_has_a_line_and_ends_the_signature(
+    signed: Path, name: str, old: str, new: str, line: str, code: int
+) -> None:
+    """The same lines in the report and on the terminal, though most leave every verdict and gate as before."""
+    edit(signed / "contracts/s" / name, (old, new))
+    avow("verify", cwd=signed)
+    done = avow("diff", "signed", cwd=signed)
+    assert done.returncode == code, done.stdout
+    assert any(told.startswith(f"  {line}") for told in done.stdout.splitlines()), done.stdout
+    found = read_case(signed / "reports/s")
+    assert [entry.words for entry in found.changes.entries if entry.words not in done.stdout] == []
+    assert any(line[2:] in entry.words for entry in found.changes.entries)
+    assert found.answers.signed.startswith("not signed: A. Person signed another state on ")
+    assert found.answers.signed in avow("report", "--check", "s", cwd=signed).stdout
+
+
+def test_a_report_is_held_against_the_signature_that_it_names(signed: Path) -> None:
+    assert avow("report", "s", cwd=signed).returncode == 0
+    done = avow("report", "--check", "s", cwd=signed)
+    assert (done.returncode, done.stdout.count("· signed by A. Person on ")) == (0, 1)
+    (path,) = (signed / "signed/s").glob("*.json")
+    path.rename(path.with_name("0002-other.json"))
+    done = avow("report", "--check", "s", cwd=signed)
+    assert (done.returncode, "signature of A. Person that is not" in done.stdout) == (1, True)

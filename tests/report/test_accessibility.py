@@ -11,7 +11,8 @@ import pytest
 from assurance.sample import case as make_case
 from assurance.sample import rover_case, system
 
-from avow.assurance.compare import compare, of_case
+from avow.assurance.changes import compare
+from avow.assurance.state import state_of
 from avow.assurance.traceability import trace
 from avow.report.answers_page import render_answers, render_argument, render_index
 from avow.report.comparison import render_comparison
@@ -127,7 +128,7 @@ class Tree(HTMLParser):
 
 def pages() -> dict[str, str]:
     rover, hostile, empty = rover_case(), hostile_case(), make_case(system({}), [], [])
-    changes = [("rover", c) for c in compare(of_case(empty), of_case(rover))]
+    changes = [("rover", c) for c in compare(state_of(empty), state_of(rover))]
     return {
         "answers": render_answers(rover),
         "argument": render_argument(rover),

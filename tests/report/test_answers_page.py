@@ -12,9 +12,9 @@ from assurance.sample import case as make_case
 from assurance.sample import evidence, guarantee, node_plan, rover_case, system
 
 from avow.assurance.answers import Failure, Level
-from avow.assurance.changes import baseline_of
 from avow.assurance.codec import read_case
 from avow.assurance.model import Case
+from avow.assurance.state import baseline_of
 from avow.base.verdict import Verdict
 from avow.evidence.obligation import Kind
 from avow.report.answers_page import render_answers, render_argument, worded
@@ -177,9 +177,8 @@ def test_in_a_browser_nothing_is_clipped_and_the_budgets_hold(name: str, tmp_pat
 @pytest.mark.needs_chromium
 def test_the_seven_answers_fit_a_screen_after_any_number_of_changes(tmp_path: Path) -> None:
     signed = baseline_of(rover_case(), "f", "A. Person", "2026-11-20", "2027-11-20")
-    other = tuple((name, "", "shown", "in.r < 120 ∧ x > 1") for name, *_ in signed.requirements)
-    proved = tuple((name, "", "proved", "in.r < 120 ∧ x > 1", "") for name, *_ in signed.guarantees)
-    found = rover_case(baseline=replace(signed, requirements=other, guarantees=proved, deficits=()))
+    other = tuple((about, name, of, ("in.r < 120 ∧ x > 1",)) for about, name, of, _ in signed.items if of == "formula")
+    found = rover_case(baseline=replace(signed, items=other))
     assert len(found.changes.entries) > 20
     assert measure({"page": (render_answers(found), 1400)}, tmp_path)["page"]["bottom"] <= 1000
 

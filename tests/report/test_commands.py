@@ -15,7 +15,8 @@ import pytest
 from assurance.sample import PLAN_TEXT, RCL_TEXT, TODAY, case, evidence, rover_parts
 from click.testing import CliRunner, Result
 
-from avow.assurance.compare import compare, of_case, of_ledger
+from avow.assurance.changes import compare
+from avow.assurance.state import state_of, state_of_ledger
 from avow.base.diagnostics import Rejected
 from avow.base.files import sha256
 from avow.base.verdict import Verdict
@@ -25,6 +26,7 @@ from avow.cli.explain import command as explain
 from avow.cli.init import command as init
 from avow.cli.report import command as report
 from avow.evidence.ledger import Ledger
+from avow.evidence.obligation import Kind
 from avow.report import render_all
 
 
@@ -137,23 +139,21 @@ def test_diff_of_reports_and_ledgers(root: Path) -> None:
     render_all(case(subject, obligations, better, keys=keys, **extras), root / "new")
     assert run(diff, "reports", "reports/rover") == (0, "nothing changed\n")
     text = run(diff, "reports/rover", "new")[1]
-    assert "better: rover/radiationSensor/guarantee/medium: refuted → tested" in text
+    assert "▲ refuted → tested: “" in text
     other = root / "other.jsonl"
     Ledger(other).append_all([*records, evidence("radiationSensor.low", Verdict.REFUTED)])
     changes = json.loads(run(diff, "artifacts/ledger/rover.jsonl", str(other), "--json")[1])["changes"]
-    why = changes[0].pop("why")
     assert changes[0] == {
         "system": "rover",
-        "kind": "worse",
+        "kind": "open",
         "subject": "rover/radiationSensor/guarantee/low",
+        "words": "proved → contradictory: “radiationSensor.low”",
         "before": "proved",
         "after": "contradictory",
-        "title": "",
+        "edits": ["radiationSensor.low by hoare: proved (model) → refuted (model)"],
+        "about": "claim",
         "worse": True,
-        "old_formula": "",
-        "new_formula": "",
     }
-    assert why == ["hoare was re-run, with nothing changed that it depends on: proved → refuted, refuted by hoare"]
     with pytest.raises(Rejected):
         run(diff, "no-such-revision", "reports/rover")
     with pytest.raises(Rejected):
@@ -175,25 +175,26 @@ def test_diff_takes_revisions_and_workspaces(tmp_path: Path, monkeypatch: pytest
     line = 1 + text[: text.index("High = 24")].count("\n")
     for old in ("v1.2", "../copy"):
         lines = run(diff, old)[1].splitlines()
-        at = lines.index("  REQ2: still not shown")
-        assert lines[at + 1].startswith(f"      {path}:{line}: High = 24;"), lines
-        assert "High = 25;" in lines[at + 1]
-        assert not [line for line in lines if line.startswith("  REQ1")]
+        at = next(n for n, one in enumerate(lines) if one.startswith("  ≠ “Above the high mark it cools” was"))
+        assert lines[at + 3].startswith(f"      {path}:{line}: High = 24;"), lines
+        assert "High = 25;" in lines[at + 3]
+        assert "Below the low mark" not in " ".join(lines)
 
 
 def test_comparison_tells_new_gone_and_changed_claims() -> None:
     subject, obligations, records, keys, extras = rover_parts()
-    old = of_case(case(subject, obligations, records, keys=keys, **extras))
+    old = state_of(case(subject, obligations, records, keys=keys, **extras))
     assert compare(old, old) == ()
     from dataclasses import replace
 
-    changed = [replace(obligations[1], digest=sha256("other")), *obligations[2:]]
-    new = of_case(case(subject, changed, records, keys=keys, **extras))
+    at = next(n for n, one in enumerate(obligations) if one.kind is Kind.GUARANTEE)
+    changed = [*obligations[1:at], replace(obligations[at], digest=sha256("other")), *obligations[at + 1 :]]
+    new = state_of(case(subject, changed, records, keys=keys, **extras))
     kinds = {(c.kind, c.subject) for c in compare(old, new)}
-    assert ("removed", obligations[0].id) in kinds
-    assert ("meaning", obligations[1].id) in kinds
-    assert ("added", obligations[0].id) in {(c.kind, c.subject) for c in compare(new, old)}
-    assert of_ledger("x", ()).claims == {}
+    assert ("gone", obligations[0].id) in kinds
+    assert ("meaning", obligations[at].id) in kinds
+    assert ("new", obligations[0].id) in {(c.kind, c.subject) for c in compare(new, old)}
+    assert state_of_ledger(()).items == {}
 
 
 @pytest.mark.parametrize(("version", "fault", "code"), [(None, "", 0), ("1.0", "", 0), ("1.0", "it does not link", 3)])

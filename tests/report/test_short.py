@@ -13,9 +13,9 @@ import pytest
 from assurance.sample import case as make_case
 from assurance.sample import rover_case, system
 
-from avow.assurance.changes import baseline_of
 from avow.assurance.codec import read_case
 from avow.assurance.model import Case
+from avow.assurance.state import baseline_of
 from avow.base.tuning.shown import PDF_OBLIGATIONS
 from avow.report.answers_page import render_answers, render_argument
 from avow.report.markdown import render_markdown
