@@ -80,7 +80,7 @@ from avow.base.verdict import Link, Verdict
 from avow.evidence.claims import Claim, Standing, judge
 from avow.evidence.ledger import Entry
 from avow.evidence.obligation import Kind, Obligation
-from avow.evidence.record import OUTPUT_FOR_EVERY_INPUT, Evidence
+from avow.evidence.record import AGAINST, OUTPUT_FOR_EVERY_INPUT, Evidence
 from avow.evidence.status import Status, behind, best_link, effective, roll_up, weigh
 
 
@@ -103,9 +103,7 @@ def conclude(facts: Facts) -> Case:
     """Everything that follows from the facts. Pure: same facts, same case."""
     evidence, orphans = _evidence(facts)
     counting = {name: tuple(v.entry for v in views if v.counts) for name, views in evidence.items()}
-    statuses = {
-        o.id: roll_up((e.evidence for e in counting[o.id]), outdated=bool(evidence[o.id])) for o in facts.obligations
-    }
+    statuses = {o.id: _status(counting[o.id], outdated=bool(evidence[o.id])) for o in facts.obligations}
     statuses |= {o.id: Status.UNWRITTEN for o in facts.obligations if o.unwritten}
     by_program = shown_by_programs(facts.obligations, statuses, counting)
     statuses |= {name: status for name, (status, _) in by_program.items()}
@@ -232,6 +230,13 @@ def conclude(facts: Facts) -> Case:
     )
     case = replace(case, changes=changes(case))
     return replace(case, answers=with_signature(case))
+
+
+def _status(entries: Sequence[Entry], *, outdated: bool) -> Status:
+    """A proof from other claims, and data against what follows: no tool is wrong, but one of these claims is."""
+    status = roll_up((e.evidence for e in entries), outdated=outdated)
+    refuting = [e.evidence for e in entries if weigh(e.evidence).refuted]
+    return Status.REFUTED if refuting and all(AGAINST in record.details for record in refuting) else status
 
 
 def _granted(claims: Sequence[Claim], standings: Mapping[str, Standing], facts: Facts) -> Mapping[str, Standing]:

@@ -18,6 +18,7 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Any, get_origin, get_type_hints
 
+from avow.backend_kit.further import Further
 from avow.base.codes import Code
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.records import dataclass
@@ -87,6 +88,8 @@ class Job:
     kept: Mapping[str, Sequence[Any]] = field(default_factory=dict)
     """Obligation's id → cases that refuted it once, as this backend put them under `record.CASE` into an outcome's
     details. A backend that stores cases tries them first, with any options."""
+    further: tuple[Further, ...] = ()
+    """For a method that judges recorded data: the other claims that these may contradict."""
 
     @property
     def every(self) -> tuple[Obligation, ...]:
@@ -173,6 +176,9 @@ class Report:
     repeats the answer."""
     isolation: Isolation = Isolation.NONE
     """How the program under test was isolated from its oracle."""
+    contradicted: tuple[Outcome, ...] = ()
+    """Refutations of claims that the job does not answer, by its data. `Outcome.obligation` is the claim's id without
+    the system, or an assumption's (`avow.backend_kit.further`)."""
 
     @classmethod
     def alike(cls, job: Job, verdict: Verdict, summary: str, tool: str, tool_version: str) -> Report:

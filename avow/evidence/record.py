@@ -44,6 +44,13 @@ compared."""
 SOLVER = "solver"
 """Among the details: the solver that decides for the tool, named as methods that call it directly name their tool."""
 
+CONTRADICTS = "contradicts"
+"""Among the details of a method that judges recorded data: the other claims that these contradict, by the names of
+`avow.backend_kit.further`."""
+
+AGAINST = "against"
+"""Among the details of a refutation by data that the plan names under another claim: that method's name."""
+
 STANDS_ON = (OBSERVED, ISOLATION, RETRY, "certificate", "mutation", "valid_until")
 """The details by which one of two records with the same statement may count and the other not."""
 

@@ -34,7 +34,7 @@ from avow.calculus.obligations import discharged_by
 from avow.evidence.continuity import continuity
 from avow.evidence.heads import index_path, read_index
 from avow.evidence.ledger import Entry, Ledger, ledger_of
-from avow.evidence.record import CASE, RETRY
+from avow.evidence.record import AGAINST, CASE, RETRY
 from avow.evidence.signing import private_key
 from avow.evidence.status import Status
 from avow.pipeline import check as checking
@@ -194,7 +194,21 @@ class _Basis:
 def _basis(state: State, surveyed: Survey, ledger: Ledger) -> _Basis:
     root = state.workspace.root
     entries = counting_now(ledger, root, surveyed.system, state.run)
-    return _Basis(ledger, entries, {**surveyed.keys, **_given_up(surveyed, entries, root)})
+    return _Basis(
+        ledger, entries, {**surveyed.keys, **_given_up(surveyed, entries, root), **_against(surveyed, entries)}
+    )
+
+
+def _against(surveyed: Survey, entries: Sequence[Entry]) -> dict[tuple[str, str], str]:
+    """Refutations of claims by data that the plan names under other claims, as the data and these claims are now."""
+    found: dict[tuple[str, str], str] = {}
+    works = {work.name: work for work in surveyed.catalogue.works if work.others}
+    now = {o.id: o for o in surveyed.catalogue.obligations}
+    for record in (entry.evidence for entry in entries):
+        work, other = works.get(str(record.details.get(AGAINST))), now.get(record.obligation)
+        if work is not None and other is not None and work.key_of(other) == record.key:
+            found[record.obligation, record.method] = record.key
+    return found
 
 
 def _given_up(surveyed: Survey, entries: Sequence[Entry], root: Path) -> dict[tuple[str, str], str]:

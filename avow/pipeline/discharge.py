@@ -20,7 +20,7 @@ from avow.base.workspace import Workspace
 from avow.evidence.currency import outlived
 from avow.evidence.ledger import Entry, ledger_of
 from avow.evidence.obligation import Obligation
-from avow.evidence.record import CASE, ISOLATION, OBSERVED, RETRY, Evidence
+from avow.evidence.record import AGAINST, CASE, CONTRADICTS, ISOLATION, OBSERVED, RETRY, Evidence
 from avow.pipeline import dispatch
 from avow.pipeline.export import folder
 from avow.pipeline.recheck import still_counts
@@ -41,8 +41,17 @@ def open_obligations(workspace: Workspace, work: Work, run: Run) -> tuple[Obliga
             (o, ledger.refutations(o.id, o.digest, work.engine), ledger.current(o.id, work.keys[o.id]))
             for o in work.obligations
         ]
+        contradicted = {claim for *_, entries in known for claim in _contradicts(entries[-1:])}
+        others = [o for claim in contradicted for o in work.others.get(claim, ())]
+        unsaid = any(not ledger.current(o.id, work.key_of(o)) for o in others)
+    if unsaid:  # the composition has got other conditions since
+        return work.obligations
     found = tuple(o for o, refuted, entries in known if not _is_settled(workspace, work, refuted, entries, run, intact))
     return work.obligations if found and not work.is_engine else found
+
+
+def _contradicts(entries: Sequence[Entry]) -> list[str]:
+    return [claim for entry in entries for claim in entry.evidence.details.get(CONTRADICTS, ())]
 
 
 def _is_settled(
@@ -87,15 +96,18 @@ def discharge(workspace: Workspace, work: Work, run: Run) -> tuple[Outcome, ...]
     strength, link, of = promised
     inputs = _inputs(workspace, work)
     by_id = {o.id: o for o in todo}
+    contradicts = {CONTRADICTS: [o.obligation for o in report.contradicted]} if report.contradicted else {}
+    answers = [(by_id[outcome.obligation], outcome, False) for outcome in report.outcomes]
+    answers += [(o, each, True) for each in report.contradicted for o in work.others.get(each.obligation, ())]
     records = []
-    for outcome in report.outcomes:
-        obligation = by_id[outcome.obligation]
+    for obligation, outcome, beside in answers:
+        said = {AGAINST: work.name} if beside else contradicts
         records.append(
             Evidence(
                 obligation=obligation.id,
                 obligation_digest=obligation.digest,
-                key=work.keys[obligation.id],
-                method=work.method,
+                key=work.key_of(obligation) if beside else work.keys[obligation.id],
+                method=work.name if beside else work.method,
                 backend=work.engine,
                 tool=report.tool,
                 tool_version=report.tool_version,
@@ -111,7 +123,7 @@ def discharge(workspace: Workspace, work: Work, run: Run) -> tuple[Outcome, ...]
                 counterexample=outcome.counterexample,
                 hypotheses=outcome.hypotheses,
                 bound=outcome.bound,
-                details={**outcome.details, **_circumstances(workspace, report)},
+                details={**outcome.details, **said, **_circumstances(workspace, report)},
                 vacuous=outcome.vacuous,
                 run=run.id,
                 rests_on=outcome.rests_on,

@@ -110,6 +110,8 @@ def surroundings(tool: Backend, job: Job, options: str, files: Iterable[Path] | 
         parts.append(["source", *texts, *kind, sorted(declared.memory.items())])
         parts += [repr(sorted(declared.values.items()))] if declared.values else []
         parts += sorted([clause.name, digest(clause.formula)] for clause in job.begins)
+    if job.further:
+        parts.append(sorted([f.node, f.claim, digest(f.clause.formula)] for f in job.further))
     if tool.uses_criticality:
         parts.append(["criticality", job.system.plan.node(job.node.name).criticality])
     return json.dumps(parts)
@@ -154,14 +156,8 @@ def _wiring(system: System, node: Node, backends: Collection[str]) -> list[Any]:
 
 
 def upstream_of(tool: Backend, job: Job) -> frozenset[str]:
-    """The nodes whose contracts the method may look at, since their data reaches its node: none where that assumes
-    nothing."""
-    if not tool.uses_upstream or not job.node.assumptions:
-        return frozenset()
-    try:
-        return dataflow(job.system).upstream(job.node.name)
-    except Rejected:  # told elsewhere
-        return frozenset()
+    """The nodes whose contracts the method may look at: a recording has the messages of any node."""
+    return frozenset(node.name for node in job.contract.nodes) if tool.uses_upstream else frozenset()
 
 
 def _upstream_node(job: Job, name: str, backend: str) -> list[Any]:

@@ -5,12 +5,14 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 
+from avow.backend_kit.further import Further, guarantees, of_plan
 from avow.backend_kit.linked import models, unrun
 from avow.backend_kit.protocol import Backend, Job
 from avow.backend_kit.registry import backend, names
 from avow.base.files import sha256
 from avow.base.remembered import by_identity
 from avow.base.tools import package_digest, program_digest
+from avow.base.verdict import Object
 from avow.evidence.obligation import Kind, Obligation, ProgramClaim
 from avow.formulas.formula import digest, node_digest, sort_digest
 from avow.language.contract import Node
@@ -39,12 +41,30 @@ def method_backend(system: System, method: Method) -> Backend:
     return backend(method.backend, system.plan.plugins)
 
 
-def method_job(system: System, node: Node, method: Method, tool: Backend | None = None) -> Job:
-    """`tool` is the method's backend, if given: a backend under test need not be installed."""
-    claimed = (tool or method_backend(system, method)).claims
-    names = [c for c in claimed if _can_be_claimed(system, node, c)]
+def method_job(
+    system: System,
+    node: Node,
+    method: Method,
+    tool: Backend | None = None,
+    further: tuple[Further, ...] | None = None,
+) -> Job:
+    """`tool` is the method's backend, if given: a backend under test need not be installed. `further`: in a slice, the
+    job's."""
+    tool = tool or method_backend(system, method)
+    names = [c for c in tool.claims if _can_be_claimed(system, node, c)]
     claims = tuple(_program_claim(system, node, name) for name in names)
-    return Job(system, node, method, tuple(guarantee(system, node, name) for name in method.guarantees), claims)
+    obligations = tuple(guarantee(system, node, name) for name in method.guarantees)
+    return Job(system, node, method, obligations, claims, further=_further(system, node, method, tool, further))
+
+
+def _further(
+    system: System, node: Node, method: Method, tool: Backend, given: tuple[Further, ...] | None
+) -> tuple[Further, ...]:
+    """The other claims that a method's data may contradict: with `uses_upstream` of any node, else of its own."""
+    if given is not None or tool.of is not Object.RECORDING:
+        return given or ()
+    planned = (each for each in of_plan(system) if tool.uses_upstream or each.node == node.name)
+    return (*guarantees(node, method.guarantees), *planned)
 
 
 def _can_be_claimed(system: System, node: Node, name: ProgramClaim) -> bool:

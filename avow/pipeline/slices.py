@@ -10,6 +10,7 @@ from collections.abc import Collection, Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
 
+from avow.backend_kit.further import Further
 from avow.backend_kit.linked import beside, connected, reads_recordings, told_too
 from avow.backend_kit.protocol import Backend, Job
 from avow.base.records import dataclass
@@ -50,6 +51,7 @@ class MethodSlice:
     system: System
     node: str
     method: str
+    further: tuple[Further, ...] = ()
 
 
 Slice = SanitySlice | ComposeSlice | MethodSlice
@@ -102,7 +104,7 @@ def method_slice(
     edges += tuple(edge for name in sorted(upstream - {own}) for edge in graph.feeding(name))
     sources = {edge.source.node for edge in edges}
     told_of_itself = told_too(tool, job) if own in sources else frozenset[str]()
-    sources -= {own}
+    sources = (sources | upstream) - {own}
     contract = job.contract
     nodes = tuple(
         _own(job, named, upstream, sentences) if n.name == own else _other(n, upstream)
@@ -123,7 +125,7 @@ def method_slice(
     )
     told = named.definitions(contract.definitions)
     cut_contract = Contract((), named.types(contract), named.constants(contract), nodes, told)
-    return MethodSlice(System(cut, cut_contract), job.node.name, job.method.id)
+    return MethodSlice(System(cut, cut_contract), job.node.name, job.method.id, tuple(map(_bare_further, job.further)))
 
 
 def _own(job: Job, named: Named, upstream: Collection[str], sentences: bool) -> Node:
@@ -163,6 +165,10 @@ def _other(node: Node, upstream: Collection[str]) -> Node:
 def _bare_clause(clause: Clause) -> Clause:
     """Without its notation and source position."""
     return replace(clause, position=0, text="", sentence=None)
+
+
+def _bare_further(one: Further) -> Further:
+    return replace(one, clause=_bare_clause(one.clause))
 
 
 def _planned(tool: Backend, node: NodePlan, job: Job, backends: Collection[str]) -> NodePlan:

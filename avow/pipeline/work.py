@@ -13,6 +13,7 @@ from dataclasses import field, replace
 from pathlib import Path
 from typing import Any
 
+from avow.backend_kit.further import Further, assumption
 from avow.backend_kit.linked import beside
 from avow.backend_kit.protocol import Backend, Job, Limits
 from avow.base.diagnostics import Severity
@@ -20,6 +21,7 @@ from avow.base.files import digest_or_missing, sha256
 from avow.base.records import dataclass
 from avow.base.remembered import Shelf
 from avow.base.tools import libraries
+from avow.base.verdict import Object
 from avow.calculus.composition import Composition, composed
 from avow.calculus.obligations import all_tasks
 from avow.calculus.variables import Frame
@@ -66,6 +68,17 @@ class Work:
     """A method's backend, and the job that it gets; None for the core's own engines."""
     texts: str = field(default="", compare=False, repr=False)
     """The digest of the plan's and the contract's texts."""
+    others: Mapping[str, tuple[Obligation, ...]] = field(default_factory=dict, compare=False, repr=False)
+    """For a method that judges recorded data: claim that these may contradict → its obligations."""
+
+    @property
+    def name(self) -> str:
+        """The method in the records of claims that it contradicts: other nodes may have one of the same id."""
+        return f"{self.node}.{self.method}"
+
+    def key_of(self, other: Obligation) -> str:
+        """The key of a record that its data contradict another claim. The method's own keys cover that claim."""
+        return sha256(json.dumps([other.id, other.digest, self.name, *sorted(self.keys.values())]))
 
     def changed(self) -> bool:
         """Whether contract or plan have changed since this job was made."""
@@ -159,11 +172,13 @@ def _method_works(system: System, offered: Offered = None) -> tuple[Work, ...]:
     )
 
 
-def method_work(system: System, node: Node, method: Method, offered: Offered = None) -> Work:
-    """`offered`: the tools of the machines that jobs are sent to, if any."""
+def method_work(
+    system: System, node: Node, method: Method, offered: Offered = None, further: tuple[Further, ...] | None = None
+) -> Work:
+    """`offered`: the tools of the machines that jobs are sent to, if any. `further`: in a slice, the job's."""
 
     tool = method_backend(system, method)
-    job = method_job(system, node, method)
+    job = method_job(system, node, method, tool, further)
     options = method.options.data if isinstance(method.options.data, Mapping) else {}
     told = method_options(method)
     tools = tool_identities(tool, offered)
@@ -273,7 +288,25 @@ def catalogue(system: System, offered: Offered = None, shelf: Shelf | None = Non
     every = {o.id: o for work in works if work.is_engine for o in work.obligations}
     every |= {o.id: o for o in guarantees}
     every |= {o.id: o for work in works for o in work.obligations if o.kind is Kind.PROGRAM}
+    others = _others(every.values())
+    works = tuple(replace(work, others=others) if _judges_data(work) else work for work in works)
     return Catalogue(system, tuple(every.values()), works)
+
+
+def _judges_data(work: Work) -> bool:
+    return work.planned is not None and work.planned[0].of is Object.RECORDING
+
+
+def _others(obligations: Iterable[Obligation]) -> dict[str, tuple[Obligation, ...]]:
+    """The obligations by their names in `avow.backend_kit.further`. That an assumption holds in the system is what each
+    of the composition's claims that discharge it says."""
+    found: dict[str, tuple[Obligation, ...]] = {}
+    for o in obligations:
+        name = o.local_id
+        if o.kind is Kind.COMPOSITION and o.clauses and o.name.endswith(f".{o.clauses[0]}"):
+            name = assumption(*o.clauses[0].split("."))
+        found[name] = (*found.get(name, ()), o)
+    return found
 
 
 def _keys(

@@ -49,7 +49,6 @@ from avow.sanity import results
 from avow.sanity.analysis import outcomes
 from avow.solving.checking import z3_version
 from avow.solving.limits import effort_told, from_seconds
-from avow.system.plan import System
 
 
 class Refused(Exception):  # noqa: N818 - it names what happened
@@ -114,8 +113,8 @@ def _execute(request: Request, root: Path) -> Report:
             kept = {recheck.FILE: recheck.written(composition.certificates)} if composition.certificates.made else {}
             kept |= {ANSWERS: write_answers(answers)} if answers.now else {}
             return Report(outcomes, "z3", z3_version(), logs=kept)
-        case MethodSlice(system=system, node=node, method=method):
-            return _discharge(request, system, _method_work(system, node, method))
+        case MethodSlice():
+            return _discharge(request, cut)
         case _:
             raise Refused("the work came with another engine's slice")
 
@@ -130,17 +129,17 @@ def keys_of(cut: Slice) -> Mapping[str, str]:
                 return sanity_claims(cut)[1]
             case ComposeSlice(system=system):
                 return compose_work(compose(system)).keys
-            case MethodSlice(system=system, node=node, method=method):
-                return _method_work(system, node, method).keys
+            case MethodSlice():
+                return _method_work(cut).keys
     except (KeyError, Rejected) as error:
         raise Refused(f"what came is not what its keys are of: {error}") from error
 
 
-def _method_work(system: System, node: str, method: str) -> Work:
-    planned = [m for m in system.plan.node(node).methods if m.id == method]
+def _method_work(cut: MethodSlice) -> Work:
+    planned = [m for m in cut.system.plan.node(cut.node).methods if m.id == cut.method]
     if not planned:
         raise Refused("the work came without its method")
-    return method_work(system, system.contract.node(node), planned[0])
+    return method_work(cut.system, cut.system.contract.node(cut.node), planned[0], further=cut.further)
 
 
 def _shown(tools: Tools) -> str:
@@ -155,7 +154,8 @@ def _claims(request: Request, obligations: Sequence[Obligation], keys: Mapping[s
     return tuple(o for o in obligations if o.id in request.keys)
 
 
-def _discharge(request: Request, system: System, work: Work) -> Report:
+def _discharge(request: Request, cut: MethodSlice) -> Report:
+    work = _method_work(cut)
     assert work.planned is not None
     tool, job = work.planned
     here = tool_identities(tool)
@@ -171,7 +171,7 @@ def _discharge(request: Request, system: System, work: Work) -> Report:
     )
     report = one_step.discharge(tool, job, Path(request.folder), request.limits)
     if request.root:  # tools read the plan's files themselves, at any time until now
-        again = _method_work(system, work.node, work.method)
+        again = _method_work(cut)
         _claims(request, again.obligations, again.keys)
     return remarked(report, one_step.check(tool, job), job)
 

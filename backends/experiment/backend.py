@@ -16,6 +16,7 @@ from avow.base.verdict import Link, Object, Verdict
 from avow.language.contract import Clause, Node
 
 from .campaign import NotMade, drawn, experiment, recorded, regressions
+from .further import contradictions
 from .options import SCHEMA, read
 from .profile import Campaign, command_files, read_campaign, regressions_of
 from .verdict import settle
@@ -26,7 +27,7 @@ class ExperimentBackend(Backend):
 
     name = "experiment"
     title = "recorded runs, judged by the guarantee and exact binomial statistics"
-    version = "9"
+    version = "10"
     strength = Verdict.TESTED
     remembers = True
     uses_scenario = False
@@ -102,7 +103,8 @@ class ExperimentBackend(Backend):
             link = Link.GUIDED if found.claims[o.name].interpreted else self.link
             of = self.of if campaign is None else Object.MODEL
             outcomes.append(replace(outcome, obligation=o.id, link=link, of=of))
-        return Report(tuple(outcomes), "avow experiment", self.version, logs=logs)
+        beyond = tuple(contradictions(job, found)) if campaign is None else ()
+        return Report(tuple(outcomes), "avow experiment", self.version, logs=logs, contradicted=beyond)
 
 
 def _campaign(job: Job) -> Campaign | None:

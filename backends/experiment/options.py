@@ -80,6 +80,26 @@ def read(job: Job) -> Experiment:
     return found
 
 
+def everything(job: Job) -> tuple[tuple[Run, ...], tuple[Interpretation, ...], set[str]]:
+    """The runs of a table without errors, with the value of each port that has one in every row; the meanings of
+    predicates; and the names of these ports."""
+    reader = _Reader(job)
+    table = reader._table()
+    assert table is not None
+    meanings = tuple(reader._meanings(table))
+    bindings = {b.name: b for b in (*reader._mapped(table), *(b for one in meanings for b in one.bindings))}
+    readable = [b for b in bindings.values() if all(_readable(b, row) for row in table.rows)]
+    return reader._runs(table, [], readable), meanings, {binding.name for binding in readable}
+
+
+def _readable(binding: Binding, row: Row) -> bool:
+    try:
+        binding.value(row.cells)
+    except (Unfit, KeyError):
+        return False
+    return True
+
+
 def limits(job: Job, runs: tuple[Run, ...], claims: Mapping[str, Claim], replayed: tuple[Run, ...]) -> Experiment:
     """A campaign's runs with the options of the claim. Raises Rejected."""
     reader = _Reader(job)
@@ -110,6 +130,7 @@ class _Reader:
         self._measured(bindings, meanings)
         bindings += {b.name: b for one in meanings for b in one.bindings}.values()
         claims = self._claims(bindings, meanings)
+        self._outside()
         named = [column for binding in bindings for column in binding.columns]
         runs = self._runs(table, named, bindings := self._read(bindings, claims))
         return self.claimed(runs, claims, tuple(bindings))
@@ -208,6 +229,14 @@ class _Reader:
             if one.output and all(column in given for b in one.bindings for column in b.columns):
                 message = f"{one.pattern_text}: its meaning reads only columns that are bound to inputs"
                 self.add("interpret", message, code="EXP106", entry=one.pattern_text)
+
+    def _outside(self) -> None:
+        node = self.job.node
+        known = {c.name for c in node.assumptions} | {p.variable.qualified for p in node.inputs}
+        for name in self.options.get("outside", {}):
+            if name not in known:
+                hint = suggest(name, sorted(known))
+                self.add("outside", f"{node.name} has no assumption or input '{name}'", hint, entry=name)
 
     def _claims(self, bindings: Iterable[Binding], meanings: Sequence[Interpretation]) -> Mapping[str, Claim]:
         known, node = {binding.name for binding in bindings}, self.job.node

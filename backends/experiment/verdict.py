@@ -89,7 +89,7 @@ def _outcome(claim: Claim, found: Sequence[tuple[Run, Judged]], experiment: Expe
         names = listed(unfinished, FAILURES_SHOWN)
         rests.append(f"no answer would be late in runs that end before one is due: {names}")
     if sample.failed:
-        details["failing runs"] = _counterexample(claim, sample.failed).explanation
+        details["failing runs"] = counterexample(claim, sample.failed).explanation
         rests.append(f"the guarantee is meant statistically: in at least {_percent(asked)} of runs")
     return replace(outcome, verdict=Verdict.TESTED, summary=text, hypotheses=tuple(rests))
 
@@ -105,7 +105,7 @@ def _failed(outcome: Outcome, claim: Claim, failed: Sequence[tuple[Run, Judged]]
         text = f"{outcome.summary}: run {run.name} has no recording ({one.lost})"
         return replace(outcome, verdict=Verdict.ERROR, summary=text, hypotheses=())
     kept = [{"run": run.name, "rows": list(run.rows)} for run, _ in broken[:FAILURES_KEPT]]
-    details, shown = {**outcome.details, CASE: kept}, _counterexample(claim, broken)
+    details, shown = {**outcome.details, CASE: kept}, counterexample(claim, broken)
     outcome = replace(outcome, hypotheses=(), vacuous=False)
     return replace(outcome, verdict=Verdict.REFUTED, counterexample=shown, details=details)
 
@@ -199,7 +199,7 @@ def _too_few(text: str, sample: _Sample, experiment: Experiment, asked: Fraction
     return f"{text}; success in {_percent(asked)} of runs, {what}, is not shown: {enough}"
 
 
-def _counterexample(claim: Claim, failed: Sequence[tuple[Run, Judged]]) -> Counterexample:
+def counterexample(claim: Claim, failed: Sequence[tuple[Run, Judged]]) -> Counterexample:
     run, one = failed[0]
     if run.verdicts:
         about = (("run", run.name), *run.rows[0].items(), *one.shown)

@@ -15,7 +15,7 @@ from avow.base.codec import document
 from avow.base.codes import Catalogue
 from avow.base.diagnostics import Diagnostic, Severity
 from avow.base.files import inside, read_text
-from avow.base.suggestions import nearby
+from avow.base.suggestions import nearby, suggest
 from avow.base.tools import Tool, works
 from avow.base.verdict import Link, Object, Verdict
 from avow.ros.sources import message_files
@@ -41,7 +41,7 @@ class RosMonitoringBackend(Backend):
 
     name = "rosmonitoring"
     title = "runtime monitors, and recorded traces judged by them"
-    version = "15"
+    version = "16"
     strength = Verdict.MONITORED
     link = Link.MAPPED
     of = Object.RECORDING
@@ -68,6 +68,7 @@ class RosMonitoringBackend(Backend):
 
         from .memory import unmonitored
         from .notes import readings
+        from .observing import outside
         from .options import setup
         from .overhead import overheads
 
@@ -87,6 +88,11 @@ class RosMonitoringBackend(Backend):
                 message = f"traces: {name!r} is not the recording that the plan names: its digest is {there}"
                 hint = "put the recording there, or write this digest if it is the one that is meant"
                 problems.append(Diagnostic("MON102", message, span, hint=hint))
+            known = {c.name for c in job.node.assumptions} | {p.variable.qualified for p in job.node.inputs}
+            for key in outside(job.method.options, name):
+                if key not in known:
+                    message = f"traces: outside: {job.node.name} has no assumption or input {key!r}"
+                    problems.append(Diagnostic("MON101", message, span, hint=suggest(key, sorted(known))))
         bags = not any(name.endswith(".jsonl") for name in _traces(job))  # whose messages have their types' fields only
         for obligation in () if faults else job.obligations:
             clause = job.clause(obligation)

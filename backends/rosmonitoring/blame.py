@@ -157,7 +157,8 @@ class Blame:
             why += f" ({', '.join(unseen)} is not monitored)" if unseen else ""
             given = [f"in.{port}" for port, feeding in edges.items() if not feeding]
             why += f"; {', '.join(given)} came from the environment" if given else ""
-        return replace(violation, fault=Fault.PROVIDER, cause=why)
+        first_broken = origin.text.partition(" at event ")[0] if causes else ""
+        return replace(violation, fault=Fault.PROVIDER, cause=why, origin=first_broken)
 
     def _edges(self, violation: Violation, port: str) -> list[Edge]:
         """The edges that feed an input: of several publishers, the message's own, or all if unknown."""

@@ -390,9 +390,16 @@ def recordings(options: Located | None) -> dict[str, str]:
         match entry:
             case str(path):
                 found[path] = ""
-            case {"path": str(path), "sha256": str(digest)}:
-                found[path] = digest
+            case {"path": str(path)}:
+                found[path] = str(entry.get("sha256", ""))
     return found
+
+
+def outside(options: Located | None, recording: str) -> Mapping[str, str]:
+    """The assumptions outside of which a recording was made on purpose, or inputs from the environment, and why."""
+    named = data_of(options).get("traces")
+    entries = (entry for entry in named if isinstance(entry, Mapping)) if isinstance(named, list) else ()
+    return next((entry.get("outside", {}) for entry in entries if entry.get("path") == recording), {})
 
 
 def sources(system: System, node: Node, port: str) -> list[Endpoint]:

@@ -27,11 +27,12 @@ from avow.ros.bags import digest_trace
 from avow.system.graph import dataflow
 
 from .engine import Monitor
+from .further import contradictions
 from .judged import Judgement, ReportingMonitor
 from .lanes import signals, timeline
 from .memory import unmonitored
 from .notes import readable
-from .observing import method_of
+from .observing import method_of, outside
 from .options import Setup, origin, setup, usable
 from .overhead import overheads
 from .pairing import Answers
@@ -68,13 +69,25 @@ def discharge(job: Job, traces: Mapping[str, str], limits: Limits) -> Report:
     cost, _ = overheads(job)
     excuse = _excuse(job, runs)
     outcomes = tuple(outcome(o.id, Shown(o.name, runs, _spoken(job, o), excuse)) for o in job.obligations)
+    whole = [run.name for run in runs if run.monitor.events and not (run.trouble or run.missing or run.unknown)]
+    beyond, late = contradictions(job, whole, limits.seconds)
+    if late:
+        outcomes = tuple(
+            replace(o, verdict=Verdict.UNKNOWN, summary=late) if o.verdict.supports else o for o in outcomes
+        )
+    aside = [f"{n}: outside of {key} on purpose: {why}" for n in traces for key, why in _outside(job, n).items()]
+    outcomes = tuple(replace(o, summary="; ".join((o.summary, *aside))) for o in outcomes)
     for obligation, each in zip(job.obligations, outcomes, strict=True):
         each.details["rml"] = refused.get(obligation.name, "translated")
         if cost:
             each.details["overhead"] = cost
         if drawn := _timelines(job, found, runs, obligation):
             each.details["timeline"] = drawn
-    return Report(outcomes, "avow monitor", __version__, (), logs)
+    return Report(outcomes, "avow monitor", __version__, (), logs, contradicted=beyond)
+
+
+def _outside(job: Job, recording: str) -> Mapping[str, str]:
+    return outside(job.method.options, recording)
 
 
 def _without_trace(job: Job, found: Setup, refused: dict[str, str], obligation: Obligation) -> Outcome:

@@ -233,6 +233,8 @@ class Violation:
     cause: str = ""
     """For an assumption that another node's message broke: ``sensor.nonneg at event 7 caused guard.nonneg at event 8``,
     or why no first breach is known."""
+    origin: str = ""
+    """For such an assumption: the clause that was broken first (``sensor.nonneg``), if it is known."""
 
     def text(self) -> str:
         about = ", ".join(f"{n} = {v}" for n, v in (*self.bindings, *self.values))

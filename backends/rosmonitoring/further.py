@@ -1,0 +1,176 @@
+"""What a recording breaks besides the guarantees that the plan names it for: guarantees and assumptions of any node,
+what the plan assumes of the environment, and requirements about one node.
+
+The first node of the contract that names a recording judges all of that, as ``avow monitor`` does.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from avow.backend_kit.further import Further, assumption, contradicted
+from avow.backend_kit.protocol import Job
+from avow.base.files import inside
+from avow.base.verdict import Counterexample, Outcome, Verdict
+from avow.evidence.obligation import Kind
+from avow.formulas.formula import free_variables
+from avow.language.contract import Clause, ClauseKind, Node
+from avow.language.subterms import ports_of
+from avow.language.terms import Role
+from avow.system.plan import Located
+
+from .engine import Monitor
+from .notes import readable
+from .observing import method_of, outside, recordings, sources
+from .options import Setup, origin, same_topic, setup
+from .session import Session
+from .verdicts import Run, Shown, outcome
+from .watched import Fault, Violation
+
+
+class _Apart(Session):
+    """Of clauses that are no node's own: no node is to blame for them."""
+
+    def with_causes(self, violations: list[Violation], *, over: bool = False) -> Iterator[Violation]:
+        return iter(violations)
+
+
+def contradictions(job: Job, names: Sequence[str], seconds: float) -> tuple[tuple[Outcome, ...], str]:
+    """The claims that these recordings refute, each once, and why not all of them could be judged."""
+    found: dict[str, Outcome] = {}
+    for name in names:
+        path = inside(job.root, name)
+        if path is not None and _leads(job, name):
+            one = _Recording(job, name, path, time.process_time() + seconds)
+            for each in one.refuted():
+                found.setdefault(each.obligation, each)
+            if one.late:
+                return tuple(found.values()), one.late
+    return tuple(found.values()), ""
+
+
+def _leads(job: Job, name: str) -> bool:
+    own = job.node.name
+    naming = (n.name for n in job.contract.nodes if n.name == own or name in recordings(method_of(job.system, n.name)))
+    return next(naming) == own
+
+
+class _Recording:
+    def __init__(self, job: Job, name: str, path: Path, deadline: float) -> None:
+        self.job, self.name, self.path, self.deadline = job, name, path, deadline
+        self.late = ""
+        self.apart: dict[str, set[str]] = {}
+        """Node → the ports whose messages did not come from the system, according to the plan."""
+        for node in job.contract.nodes:
+            given = outside(self._options(node), name)
+            ports = {v.name for c in node.assumptions if c.name in given for v in ports_of(c.formula)}
+            self.apart[node.name] = ports | {key.removeprefix("in.") for key in given}
+        self.played = {
+            source.node
+            for node in job.contract.nodes
+            for port in self.apart[node.name]
+            for source in sources(job.system, node, port)
+        }
+
+    def _options(self, node: Node) -> Located | None:
+        return self.job.method.options if node.name == self.job.node.name else method_of(self.job.system, node.name)
+
+    def refuted(self) -> Iterator[Outcome]:
+        setups = {node.name: made for node in self.job.contract.nodes if (made := self._setup(node)) is not None}
+        runs = self._judge(Session, [self._promising(made) for made in setups.values()])
+        broken = {each.obligation: each for run in runs for each in self._guarantees(run)}
+        yield from broken.values()
+        for run in runs:
+            yield from self._assumptions(run, broken)
+        claims = [f for f in self.job.further if f.clause.kind is ClauseKind.ASSUMPTION and f.node in setups]
+        for run in self._judge(_Apart, [self._assumed(setups[f.node], f) for f in claims]) if claims else ():
+            yield from self._environment(run, claims)
+
+    def _setup(self, node: Node) -> Setup | None:
+        if node.relay:
+            return None
+        made, faults = setup(self.job.system, node, self._options(node))
+        return None if faults or readable(made, self.path, origin(self.job.system)) else made
+
+    def _promising(self, made: Setup) -> Monitor:
+        """A node's monitor, that also judges the requirements about it."""
+        about = [f for f in self.job.further if f.node == made.node.name]
+        required = tuple(f.clause for f in about if f.claim.startswith(f"system/{Kind.REQUIREMENT}/"))
+        ports = self.apart[made.node.name]
+        excused = tuple(f.clause for f in about if f.clause.kind is ClauseKind.ASSUMPTION and _names(f.clause) & ports)
+        node = made.node
+        node = replace(node, guarantees=(*node.guarantees, *required), assumptions=(*node.assumptions, *excused))
+        return Monitor(replace(made, node=node))
+
+    def _assumed(self, made: Setup, claim: Further) -> Monitor:
+        node = replace(made.node, assumptions=(claim.clause,), guarantees=())
+        return Monitor(replace(made, node=node, answers=None, fresh={}, rates={}))
+
+    def _judge(self, kind: type[Session], monitors: Sequence[Monitor]) -> list[Run]:
+        runs = [Run(self.name, monitor) for monitor in monitors]
+        whole = kind(self.job.system, tuple(monitors))
+        for _, violations in whole.judged(self.path):
+            for run in runs if violations else ():
+                names = {c.name for c in run.monitor.setup.node.clauses}
+                run.note(v for v in violations if v.clause in names)
+            if time.process_time() > self.deadline:
+                self.late = f"{self.name}: time was up before all claims that it may contradict were judged"
+                break
+        return runs
+
+    def _guarantees(self, run: Run) -> Iterator[Outcome]:
+        node, claims = run.monitor.setup.node, {f.clause.name: f.claim for f in self.job.further}
+        own = {o.name for o in self.job.obligations} if node.name == self.job.node.name else set()
+        if node.name in self.played:
+            return
+        for clause in node.guarantees:
+            if clause.name in own or clause.unwritten:
+                continue
+            spoken = frozenset(v.qualified for v in free_variables(clause.formula))
+            answer = outcome("", Shown(clause.name, [run], spoken, "an assumption was broken"))
+            if answer.verdict is Verdict.REFUTED and answer.counterexample is not None:
+                claim = claims.get(clause.name, f"{node.name}/{Kind.GUARANTEE}/{clause.name}")
+                yield contradicted(claim, answer.summary, answer.counterexample)
+
+    def _assumptions(self, run: Run, broken: Mapping[str, Outcome]) -> Iterator[Outcome]:
+        """The broken assumptions. One that another node's breach caused is discharged by what that breach refutes."""
+        node = run.monitor.setup.node
+        own = {c.name for c in self.job.contract.node(node.name).assumptions}
+        for v in run.first.values():
+            if v.fault not in (Fault.ASSUMPTION, Fault.PROVIDER) or v.clause not in own or node.name in self.played:
+                continue
+            by = v.origin.replace(".", f"/{Kind.GUARANTEE}/", 1)
+            if by not in broken and self._is_sure(run, node.clause(v.clause)):
+                yield self._told(assumption(node.name, v.clause), v)
+
+    def _environment(self, run: Run, claims: Sequence[Further]) -> Iterator[Outcome]:
+        (clause,) = run.monitor.setup.node.assumptions
+        claim = next(f.claim for f in claims if f.node == run.monitor.setup.node.name and f.clause == clause)
+        first = next((v for v in run.first.values() if v.fault is Fault.ASSUMPTION), None)
+        if first is not None and self._is_sure(run, clause):
+            yield self._told(claim, first)
+
+    def _is_sure(self, run: Run, clause: Clause) -> bool:
+        """Whether a breach is one of values that belong together: of one topic, or of one step."""
+        monitor = run.monitor
+        rules = monitor.setup.carried
+        topics = {same_topic(rule.topic) for name in _qualified(clause) if (rule := rules.get(name)) is not None}
+        together = len(topics) == 1 or monitor.word is not None
+        known = not monitor.backwards and not monitor.tallies[clause.name].unpaired
+        return together and known and not _names(clause) & self.apart[monitor.setup.node.name]
+
+    def _told(self, claim: str, v: Violation) -> Outcome:
+        when = f" (t = {v.time})" if v.time else ""
+        about = f"event {v.index}{when} of {self.name}: {v.explanation}"
+        return contradicted(claim, f"broken at {about}", Counterexample((*v.bindings, *v.values), about))
+
+
+def _names(clause: Clause) -> set[str]:
+    return {v.name for v in ports_of(clause.formula) if v.role is Role.INPUT}
+
+
+def _qualified(clause: Clause) -> set[str]:
+    return {v.qualified for v in free_variables(clause.formula)}
