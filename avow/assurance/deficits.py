@@ -15,8 +15,14 @@ from avow.evidence.obligation import Kind
 from avow.evidence.status import Status, weigh
 
 _WORDS = {
+    "withdrawn": ("refutation{s} by what the plan no longer uses", "no longer used", "It refuted, and left the plan."),
     "open": ("guarantee{s} without support", "without support", "Missing, unanswered, vacuous or refuted."),
     "premises": ("premise{s} of the composition without support", "open premises", "What follows is conditional."),
+    "underrated": (
+        "guarantee{s} of lower criticality than a hazard's severity",
+        "rated below a hazard",
+        "The policy asks less of their nodes than the hazard suggests.",
+    ),
     "argued": ("argued, not derived", "argued", "A person must agree that what is named amounts to the sentence."),
     "unvalidated": (
         "sentence{s} without a validation",
@@ -38,11 +44,6 @@ _WORDS = {
     "read": ("guarantee{s} on a person's reading only", "only read", "No tool has looked at them."),
     "single": ("guarantee{s} with one method only", "by one method", "An error of that tool would not be noticed."),
     "idle": ("guarantee{s} serving no requirement", "serving none", "No requirement needs them."),
-    "underrated": (
-        "guarantee{s} of lower criticality than a hazard's severity",
-        "rated below a hazard",
-        "The policy asks less of their nodes than the hazard suggests.",
-    ),
     "tied": (
         "guarantee{s} translated by a person for the tool",
         "translated by a person",
@@ -54,11 +55,11 @@ _WORDS = {
         "programs not run",
         "The tool that would run the program is missing: nothing is known of these claims.",
     ),
-    "withdrawn": ("refutation{s} by what the plan no longer uses", "no longer used", "It refuted, and left the plan."),
     "advice": ("open remark{s}", "remarks", "They fail no gate; read them."),
     "excused": ("finding{s} accepted by a person", "excused", "A named person takes responsibility for a finding."),
 }
-"""For each kind its name, with its number before it; the name on the first screen; and its meaning for the reader."""
+"""For each kind its name, with its number before it; the name on the first screen; and its meaning for the reader. The
+weightiest kind comes first: refutations, what lacks support, what lies under a hazard."""
 
 
 _LEAST = {"catastrophic": "high", "critical": "high", "marginal": "medium", "negligible": "low"}
@@ -88,15 +89,18 @@ def deficits(
     hazards: Sequence[HazardView],
     missing: Mapping[tuple[str, str], str],
 ) -> tuple[Deficit, ...]:
-    """Of the whole case, whether or not a requirement rests on it, as in the tables of nodes and of assumptions.
-    `single`: guarantees with one method; `missing`: (node, method) → the command that installs the missing tool."""
+    """Of the whole case, whether or not a requirement rests on it, as in the tables of nodes and of assumptions. The
+    weightiest kind is first. `single`: guarantees with one method; `missing`: (node, method) → the command that
+    installs the missing tool."""
     guarantees = [v for v in views if v.obligation.kind is Kind.GUARANTEE]
     leaves = [v for v in views if v.obligation.kind in (Kind.GUARANTEE, Kind.REQUIREMENT)]
     unrun = [(v, method) for v in guarantees for method in _unanswered(v)]
     programs = [v for v in views if v.obligation.kind is Kind.PROGRAM and v.status is Status.NOT_RUN]
     found = {
+        "withdrawn": [item.claim for item in open_items if item.kind == "withdrawn"],
         "open": [v.id for v in guarantees if not v.standing.supports],
         "premises": [v.id for v in views if v.obligation.kind is Kind.COMPOSITION and not v.standing.supports],
+        "underrated": [v.id for v in guarantees if any(v.id in h.closure and _below(v, h) for h in hazards)],
         "argued": [r.id for r in requirements if r.level is Level.ARGUED],
         "unvalidated": [r.id for r in requirements if not r.validated],
         "bounded": [r.id for r in requirements if r.bounded and r.level.holds],
@@ -110,11 +114,9 @@ def deficits(
         "read": [v.id for v in guarantees if _status(v, relied) is Status.REVIEWED],
         "single": list(single),
         "idle": [v.id for v in guarantees if requirements and not any(v.id in r.closure for r in requirements)],
-        "underrated": [v.id for v in guarantees if any(v.id in h.closure and _below(v, h) for h in hazards)],
         "tied": [v.id for v in guarantees if v.id in relied and _by_hand(v, relied[v.id])],
         "unrun": [f"{v.id}: {method}" for v, method in unrun],
         "programs": [v.id for v in programs],
-        "withdrawn": [item.claim for item in open_items if item.kind == "withdrawn"],
         "advice": [item.claim for item in open_items if item.advice and not item.handled],
         "excused": [name for f in findings if f.how == "accepted" and not f.expired for name in f.obligations],
     }

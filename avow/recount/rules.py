@@ -76,6 +76,10 @@ def _level(facts: Facts, match: re.Match[str], _block: Block) -> _Numbers:
     return str(len(facts.level(match[2]))), match[2]
 
 
+KINDS_SHOWN = 7
+"""Kinds of deficit that the first screen lists."""
+
+
 def _kinds(facts: Facts, _match: re.Match[str], _block: Block) -> _Numbers:
     return (str(sum((facts.deficit(d["key"]) or (0, 1))[1] > 0 for d in facts.case["deficits"])),)
 
@@ -317,6 +321,7 @@ RULES = (
     _rule("head", r"Refuted: ([^␟]*?)(?: and (\d+) more)?(?=; | $| · |[ ,] ?\d| WARNED)", _listed),
     _rule("head", r"; since then: ([^␟]*?)(?: and (\d+) more)?(?= ␟| $)", _since),
     _rule("q6", r"All (\d+) kinds?", _kinds),
+    _rule("q6", r"and (\d+) more kinds?", lambda f, m, b: (str(int(_kinds(f, m, b)[0]) - KINDS_SHOWN),)),
     _rule(
         "head",
         r"policy: (\d+) of (\d+) gates? pass(?:es)?(?:, (\d+) relaxed by the plan)?(?:, (\d+) not asked)?",

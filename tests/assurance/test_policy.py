@@ -420,6 +420,7 @@ def test_a_refutation_by_a_file_that_is_no_longer_read_is_told_of(read: dict[str
     assert found.obligations[0].status is Status.TESTED
     assert any("the plan no longer has it read bad" in i.text and not i.advice for i in found.open_items) is told
     assert ("withdrawn" in {d.key for d in found.deficits}) is told
+    assert (found.deficits[0].key == "withdrawn") is told  # the first screen shows the weightiest kinds only
 
 
 @pytest.mark.parametrize(
