@@ -80,8 +80,8 @@ KINDS_SHOWN = 7
 """Kinds of deficit that the first screen lists."""
 
 
-def _kinds(facts: Facts, _match: re.Match[str], _block: Block) -> _Numbers:
-    return (str(sum((facts.deficit(d["key"]) or (0, 1))[1] > 0 for d in facts.case["deficits"])),)
+def _kinds(facts: Facts) -> int:
+    return sum((facts.deficit(d["key"]) or (0, 1))[1] > 0 for d in facts.case["deficits"])
 
 
 def _deficit(facts: Facts, match: re.Match[str], _block: Block) -> _Numbers:
@@ -317,11 +317,11 @@ RULES = (
     _rule("", r"Not shown: (\d+) gates? fails?", _whole(lambda f: len(f.failing))),
     _rule("", r"(\d+) claims? about programs not run", lambda f, _m, _b: (str((f.deficit("programs") or (0, 0))[1]),)),
     _rule("", r"WARNED: (\d+) findings? known", _whole(Facts.known)),
-    _rule("", r"(\d+) kinds? of assurance deficit", _kinds),
+    _rule("", r"(\d+) kinds? of assurance deficit", _whole(_kinds)),
     _rule("head", r"Refuted: ([^␟]*?)(?: and (\d+) more)?(?=; | $| · |[ ,] ?\d| WARNED)", _listed),
     _rule("head", r"; since then: ([^␟]*?)(?: and (\d+) more)?(?= ␟| $)", _since),
-    _rule("q6", r"All (\d+) kinds?", _kinds),
-    _rule("q6", r"and (\d+) more kinds?", lambda f, m, b: (str(int(_kinds(f, m, b)[0]) - KINDS_SHOWN),)),
+    _rule("q6", r"All (\d+) kinds?", _whole(_kinds)),
+    _rule("q6", r"and (\d+) more kinds?", _whole(lambda f: _kinds(f) - KINDS_SHOWN)),
     _rule(
         "head",
         r"policy: (\d+) of (\d+) gates? pass(?:es)?(?:, (\d+) relaxed by the plan)?(?:, (\d+) not asked)?",
