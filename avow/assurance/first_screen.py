@@ -128,10 +128,11 @@ def answers(
     by_level = tuple((level, number[level]) for level in _WORST_FIRST if number[level])
     asked = [gate for gate in gates if not gate.idle]
     good = sum(gate.passed for gate in asked)
-    relaxed = sum(gate.relaxed for gate in asked)
-    idle = f", {relaxed} relaxed by the plan" if relaxed else ""
+    relaxed = [gate.title for gate in asked if gate.relaxed]
+    idle = f", {len(relaxed)} relaxed by the plan" if relaxed else ""
     idle += f", {len(gates) - len(asked)} not asked" if len(asked) < len(gates) else ""
     idle += " of known-bad material" if len(asked) < len(gates) and strict else ""
+    idle += f" (relaxed: {'; '.join(relaxed)})" if relaxed else ""
     kinds = len(deficits)
     by_node: dict[str, list[ObligationView]] = {node.name: [] for node in nodes}
     for view in views:

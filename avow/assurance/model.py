@@ -384,12 +384,13 @@ class Gate:
     @property
     def state(self) -> str:
         passes = "passes but for findings that the plan excuses" if self.excused else "passes"
+        passes += ", relaxed by the plan" if self.relaxed else ""
         return "not asked" if self.idle else passes if self.passed else "fails"
 
     @property
     def mark(self) -> str:
         """The mark shown beside the state."""
-        return "–" if self.idle else "✘" if not self.passed else "◐" if self.excused else "✔"
+        return "–" if self.idle else "✘" if not self.passed else "◐" if self.excused or self.relaxed else "✔"
 
 
 @dataclass(frozen=True, slots=True)
