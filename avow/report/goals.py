@@ -155,7 +155,10 @@ class _Argument:
             text, below = "Argument over what the evidence takes for granted", tuple(m.elements[0].name for m in others)
             strategies.append(self.made(Sort.STRATEGY, text, below))
         given = f", given assumptions A1 to A{len(assumptions)}" if assumptions else ""
-        proposition = f"{case.title} meets {count(len(self.requirements), 'requirement')}{given}"
+        met, of_all = sum(r.level.holds for r in case.requirements), count(len(self.requirements), "requirement")
+        proposition = f"{case.title} meets {of_all}{given}"
+        if not case.answers.headline.holds:
+            proposition = f"{case.title} is shown to meet {met} of {of_all}{given} ({case.answers.told})"
         top = Element(
             self.top,
             Sort.GOAL,
