@@ -61,7 +61,9 @@ def avow(*words: str, cwd: Path, stdin: str = "") -> subprocess.CompletedProcess
     out, err = (io.TextIOWrapper(io.BytesIO(), "utf-8") for _ in range(2))
     given = io.TextIOWrapper(io.BytesIO(stdin.encode()), "utf-8")
     here, code = Path.cwd(), 0
-    with mock.patch.multiple(sys, stdout=out, stderr=err, stdin=given, argv=["avow", *words]):
+    # commands set variables for the processes that they start, such as the one of --fresh
+    streams = mock.patch.multiple(sys, stdout=out, stderr=err, stdin=given, argv=["avow", *words])
+    with streams, mock.patch.dict(os.environ):
         os.chdir(cwd)
         try:
             main(list(words))

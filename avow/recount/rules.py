@@ -76,7 +76,7 @@ def _level(facts: Facts, match: re.Match[str], _block: Block) -> _Numbers:
     return str(len(facts.level(match[2]))), match[2]
 
 
-KINDS_SHOWN = 7
+KINDS_SHOWN = 6
 """Kinds of deficit that the first screen lists."""
 
 

@@ -24,7 +24,7 @@ from avow.report.goals import doubts
 from avow.report.modules import NodeModule, RequirementModule, conditions, node_modules, requirement_modules
 from avow.report.page import fill, known_pages
 
-KINDS = 7
+KINDS = 6
 """Kinds of deficit in words on the first screen, the weightiest first: a link counts and explains all."""
 DOUBTS = 1
 """Doubts about evidence in words on the first screen: those that are open for the most evidence."""
