@@ -35,7 +35,7 @@ def explained(case: Case, name: str) -> Iterator[Explanation]:
     found = [(heading, lines) for heading, names, lines in named(case) if name in names]
     if _CODE.match(name):
         found += _of_code(name)
-    if _MARK.match(name) and not found:
+    if _MARK.match(name) and not found and all(view.id != name for view in case.obligations):
         found += [_of_record(entry) for entry in _entries(case) if entry.hash.startswith(name)]
         if not found and (places := list(islice(_places(to_json(case), name), RECORDS))):
             found.append((f"{name} in report.json", places))

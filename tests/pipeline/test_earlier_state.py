@@ -114,7 +114,7 @@ def test_a_report_of_what_cannot_be_read_is_marked_until_it_can(workspace: Path,
     [
         ("n.rcl", None),
         ("more.rcl", "node m { inputs( x : REAL ) outputs( y : REAL ) topics() guarantee g ( out.y <= 1 ) }\n"),
-        ("rows.csv", "x\n2\n"),
+        ("rows.csv", "y\n1\n"),
         ("rows.csv", None),
         ("plan.yaml", None),
         ("", ""),

@@ -178,3 +178,8 @@ def test_a_record_that_the_report_leaves_out_is_found_in_the_ledger(tmp_path: Pa
 def test_a_mark_that_is_nowhere_is_not_explained() -> None:
     found = rover_case()
     assert unexplained(found, dict.fromkeys(PAGES, "<main><code>ffffffffffffffff</code>")) == {"f" * 16}
+
+
+def test_an_obligation_is_not_explained_by_its_places_in_the_report() -> None:
+    found = rover_case()
+    assert list(explained(found, found.obligations[0].id)) == []
