@@ -12,6 +12,7 @@ from dataclasses import replace
 from avow.base.diagnostics import Rejected
 from avow.base.records import dataclass
 from avow.base.remembered import by_identity
+from avow.base.suggestions import suggest
 from avow.base.verdict import Counterexample, Outcome, Verdict
 from avow.evidence.obligation import SYSTEM_LEVEL, Kind
 from avow.formulas.formula import substitute
@@ -54,6 +55,14 @@ def guarantees(node: Node, names: Iterable[str] = ()) -> tuple[Further, ...]:
 def assumption(node: str, name: str) -> str:
     """The name of the claim that an assumption of a node holds in the system, whatever discharges it."""
     return f"{node}/{ClauseKind.ASSUMPTION}/{name}"
+
+
+def unknown_outside(node: Node, names: Iterable[str]) -> Iterator[tuple[str, str, str | None]]:
+    """Each name under `outside` that is no assumption and no input of the node, with what is wrong and a hint."""
+    known = {clause.name for clause in node.assumptions} | {port.variable.qualified for port in node.inputs}
+    for name in names:
+        if name not in known:
+            yield name, f"{node.name} has no assumption or input {name!r}", suggest(name, sorted(known))
 
 
 def contradicted(claim: str, summary: str, shown: Counterexample) -> Outcome:

@@ -9,6 +9,7 @@ from dataclasses import field
 from fractions import Fraction
 from pathlib import Path
 
+from avow.backend_kit.further import unknown_outside
 from avow.backend_kit.given import existing_file, schema
 from avow.backend_kit.protocol import Job
 from avow.base.diagnostics import Diagnostic, Rejected, Span
@@ -231,12 +232,8 @@ class _Reader:
                 self.add("interpret", message, code="EXP106", entry=one.pattern_text)
 
     def _outside(self) -> None:
-        node = self.job.node
-        known = {c.name for c in node.assumptions} | {p.variable.qualified for p in node.inputs}
-        for name in self.options.get("outside", {}):
-            if name not in known:
-                hint = suggest(name, sorted(known))
-                self.add("outside", f"{node.name} has no assumption or input '{name}'", hint, entry=name)
+        for name, message, hint in unknown_outside(self.job.node, self.options.get("outside", {})):
+            self.add("outside", message, hint, entry=name)
 
     def _claims(self, bindings: Iterable[Binding], meanings: Sequence[Interpretation]) -> Mapping[str, Claim]:
         known, node = {binding.name for binding in bindings}, self.job.node

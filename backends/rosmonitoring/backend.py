@@ -9,13 +9,14 @@ from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from avow.backend_kit.further import unknown_outside
 from avow.backend_kit.given import DURATION, READING, schema
 from avow.backend_kit.protocol import Backend, Job, JudgedRun, Limits, OutsideCheck, Report, Translated
 from avow.base.codec import document
 from avow.base.codes import Catalogue
 from avow.base.diagnostics import Diagnostic, Severity
 from avow.base.files import inside, read_text
-from avow.base.suggestions import nearby, suggest
+from avow.base.suggestions import nearby
 from avow.base.tools import Tool, works
 from avow.base.verdict import Link, Object, Verdict
 from avow.ros.sources import message_files
@@ -88,11 +89,8 @@ class RosMonitoringBackend(Backend):
                 message = f"traces: {name!r} is not the recording that the plan names: its digest is {there}"
                 hint = "put the recording there, or write this digest if it is the one that is meant"
                 problems.append(Diagnostic("MON102", message, span, hint=hint))
-            known = {c.name for c in job.node.assumptions} | {p.variable.qualified for p in job.node.inputs}
-            for key in outside(job.method.options, name):
-                if key not in known:
-                    message = f"traces: outside: {job.node.name} has no assumption or input {key!r}"
-                    problems.append(Diagnostic("MON101", message, span, hint=suggest(key, sorted(known))))
+            for _, wrong, hint in unknown_outside(job.node, outside(job.method.options, name)):
+                problems.append(Diagnostic("MON101", f"traces: outside: {wrong}", span, hint=hint))
         bags = not any(name.endswith(".jsonl") for name in _traces(job))  # whose messages have their types' fields only
         for obligation in () if faults else job.obligations:
             clause = job.clause(obligation)
