@@ -45,6 +45,12 @@ class Driven:
     def value(self, script: str) -> Any:
         return self._ask("Runtime.evaluate", expression=script, returnByValue=True)["result"]["result"].get("value")
 
+    def frames(self, count: int) -> None:
+        """Wait until so many frames were drawn."""
+        step = "(n) => n ? requestAnimationFrame(() => step(n - 1)) : done()"
+        script = f"new Promise((done) => {{ const step = {step}; step({count}) }})"
+        self._ask("Runtime.evaluate", expression=script, awaitPromise=True)
+
     def press(self, key: str) -> None:
         code, text = {"Tab": (9, ""), "Enter": (13, "\r"), " ": (32, " ")}[key]
         told = {"key": key, "code": "Space" if key == " " else key, "windowsVirtualKeyCode": code}
