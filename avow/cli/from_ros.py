@@ -73,7 +73,8 @@ def draft_system(bag: Path | None, graph: str | None, distro: str | None, folder
         given = replace(given, ros2=given.ros2 or _DOMAIN.match(graph) is not None)
     listing = with_calls(_sound(listing))
     if not any(node.publishes or node.subscribes for node in listing.nodes):
-        raise Rejected(Diagnostic("CLI011", f"{' and '.join(origins)}: there is no node with a topic"))
+        hint = "give the output of `ros2 node info NODE` (or `rosnode info`) of each node, with its indented sections"
+        raise Rejected(Diagnostic("CLI011", f"{' and '.join(origins)}: no node has a topic", hint=hint))
     if bag is not None:
         given = replace(given, messages=_own_types(listing, known, base))
     graph_file = "models/rosgraph.txt" if graph is not None else None

@@ -160,7 +160,8 @@ class Names(ABC):
         """Reports an undeclared name; `text`: a string is expected."""
         if self.scope.is_broken(name) or tree.start in self.reports.odd:  # the latter is reported by the lexer
             return
-        hint = WORDS.get(name.casefold()) or did_you_mean(name, self.scope.known())
+        known = self.scope.known() if what == "name" else (*self.scope.known(), *map(str, Past), "always")
+        hint = WORDS.get(name.casefold()) or did_you_mean(name, known)
         if hint is None and text:
             hint = f'write texts in quotation marks: `"{name}"`'
         if hint is None and what == "name":

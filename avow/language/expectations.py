@@ -101,6 +101,8 @@ def _hint(start: str, earlier: Sequence[Token], found: Token, expected: frozense
         return _in_formula(earlier, found, expected) or about_keyword(found)
     if start == "topics":
         return _TOPIC
+    if start == "declaration" and found.type == "NAME" and earlier and earlier[-1].type == "NUMBER":
+        return f"only ports have units: `name : REAL in {found.text}`"
     if start == "declaration":
         return _TYPE if "ARROW" in expected else _DECLARATION
     return _TYPE if {"BUILTIN", "ARROW", "RBRACE"} & expected else _PORT

@@ -231,6 +231,8 @@ def _readable(path: Path) -> Iterator[None]:
         why, hint = str(error), None
         if "type definition" in why:
             hint = "the bag holds no definitions: name the distribution, `ros: {distro: humble}`, and `messages:`"
+        if "magic" in why or "malformed" in why:
+            hint = "it was cut off: `mcap recover` or `ros2 bag reindex` restores the messages that are whole"
         if path.is_dir() and not (path / "metadata.yaml").exists():
             why, hint = (
                 "its folder has no metadata.yaml",

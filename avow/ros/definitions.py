@@ -232,6 +232,8 @@ def parse_message(text: str, name: str, source: str = "") -> Message:
                 raise WrongDefinition(f"{value[:60]!r} is no value of {found['type']}", number)
             constants.append((found["name"], scalar.name, value.strip("\"'") if scalar.name == "string" else value))
             continue
+        if rest.startswith("//"):
+            raise WrongDefinition("`//` begins no comment", number, "a comment begins with `#`")
         if rest and (rest[0] == ";" or not line[found.end("name")].isspace()):
             text = f"{rest[:60]!r} stands after the name of the field {found['name']}"
             raise WrongDefinition(text, number, "a line ends with the name, or with a default value set apart from it")

@@ -29,6 +29,9 @@ from avow.ros.definitions import (
 
 SUFFIXES = (".msg", ".srv", ".action", ".idl")
 
+_MISNAMED = {"msgs": "msg", "messages": "msg", "srvs": "srv", "services": "srv", "actions": "action"}
+"""Folders that ROS does not read, and the names that were probably meant."""
+
 DISTRIBUTIONS = {
     "noetic": "ros1_noetic",
     **{
@@ -53,7 +56,12 @@ def definitions(paths: Iterable[Path], distro: str | None) -> tuple[Definitions,
     Faults in the files, each with its place; two files that disagree are a fault naming both."""
     faults: list[Diagnostic] = []
     found: dict[str, Message] = {}
-    for path in message_files(paths):
+    every = message_files(paths)
+    misnamed = {path.parent: path for path in reversed(every) if path.parent.name in _MISNAMED}
+    for folder, path in misnamed.items():
+        text = f"ROS reads no definitions of the package {folder.parent.name} from a folder `{folder.name}`"
+        faults.append(Diagnostic("ROS101", text, _at(path, 1), hint=f"rename it to `{_MISNAMED[folder.name]}`"))
+    for path in (path for path in every if path.parent not in misnamed):
         for message in _of_file(path, faults):
             other = found.setdefault(message.name, message)
             if other != message:

@@ -102,7 +102,11 @@ def _against_contract(node: Node, placed: Placed, code: Code) -> Iterator[Diagno
     ends = [(placed.resolved(end.name), end) for end in code.created if end.side != "declares"]
     plumbing = [name for name, _ in ends if is_plumbing(name) or name.startswith("/tf")]
     strange = {n: end for n, end in ends if (n, end.side in _TOPICS) not in known and n not in plumbing}
+    calls: set[str] = set()
     for topic, name, kind, plain in topics:
+        if not plain and name in calls:
+            continue  # the request of a call whose response was examined
+        calls |= set() if plain else {name}
         if is_plumbing(name) or kind.partition("/")[0] in OWN_CALLS:
             continue
         mine = [end for whole, end in ends if whole == name and (end.side in _TOPICS) is plain]
@@ -111,6 +115,9 @@ def _against_contract(node: Node, placed: Placed, code: Code) -> Iterator[Diagno
         if not code.unread and not any(not plain or end.side in sides.values() for end in mine):
             does = _DOES["".join(sides.values())] if len(sides) == 1 else "creates"
             near = nearest(name, strange)
+            if not near and topic.port is not None:  # the one end of this side and type that the contract lacks
+                alike = [n for n, end in strange.items() if end.side == sides[topic.port.role] and end.kind == kind]
+                near = alike if plain and len(alike) == 1 else []
             meant = [(at, strange.pop(at)) for at in near]  # one misspelt name is one fault
             meant += [(at, end) for at, end in ends if end in mine or not mine]
             notes = tuple((f"it {_DOES[end.side]} {at} here", end.span) for at, end in meant[:1])

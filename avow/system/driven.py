@@ -6,6 +6,7 @@ from __future__ import annotations
 import ast
 import contextlib
 import functools
+import re
 from collections.abc import Callable, Iterator, Mapping
 
 from avow.base.diagnostics import Diagnostic, Severity, Span
@@ -40,9 +41,14 @@ def misused(plan: Plan) -> Iterator[Diagnostic]:
             continue
         with contextlib.suppress(OSError, SyntaxError, ValueError, RecursionError):
             tree = ast.parse(read_regular(path))
-            yield from _callbacks(tree, str(path))
-            yield from _imports(tree, str(path), messages)
+            faults = [*_callbacks(tree, str(path)), *_imports(tree, str(path), messages)]
+            yield from faults
+            remedied = set(
+                re.findall(r"\w+", " ".join(re.findall("`([^`]*)`", " ".join(d.hint or "" for d in faults))))
+            )
             for name, hint in unbound(tree):
+                if name.id in remedied:
+                    continue
                 message = f"`{name.id}` is not defined: the file neither imports nor assigns it"
                 yield Diagnostic("DRIVE106", message, _span(name, str(path)), Severity.WARNING, hint)
 

@@ -7,7 +7,7 @@ name. The plan has to agree: a topic that the two resolve differently is an erro
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -21,6 +21,7 @@ from avow.base.suggestions import nearby, nearest, suggest
 from avow.base.workspace import find_workspace
 from avow.language.contract import Contract, Node
 from avow.ros.launch import Launched, Setting, Started, read_launch
+from avow.ros.launch.elements import HINT
 from avow.ros.names import Placed, Resolver
 from avow.ros.parameters import OF_EVERY_NODE, WrongParameters, flat, is_sectioned, of_node
 from avow.ros.quality import BAG_FILE
@@ -76,14 +77,22 @@ def started(plan: Plan, contract: Contract) -> tuple[Plan, tuple[Diagnostic, ...
         return plan, ()
     faults: list[Diagnostic] = []
     placed = dict(plan.ros.names.nodes)
+    unstarted: list[str] = []
     for node in contract.nodes:
         mine = plan.ros.names.placed(node.name)
         launched = _launched(plan, node, mine, faults)
-        faults += _doubted(plan, node, mine, launched)
+        if launched is None and _depends_on_launch(plan, node, mine):
+            unstarted.append(node.name)
+        if launched is not None and launched.unread and _depends_on_launch(plan, node, mine):
+            faults.append(_unknown((node.name,), "; ".join(launched.unread), launched.span))
         if launched is not None:
             faults += (*_disagreements(node, mine, launched), *_parameters(plan, node, launched))
             remaps = (*launched.remaps, *(mine.remaps if launched.unread else ()))
             placed[node.name] = Placed(launched.name, remaps, launched.span, True, True)
+    unread = [d for d in plan.launched.unread if not d.is_error]
+    if unstarted and unread:
+        why = f"a part of a launch file is not read: {unread[0].message}"
+        faults.append(_unknown(unstarted, why, unread[0].span, unread[0].hint))
     return replace(plan, ros=replace(plan.ros, names=Resolver(tuple(placed.items())))), tuple(faults)
 
 
@@ -244,23 +253,20 @@ def _launched(plan: Plan, node: Node, mine: Placed, faults: list[Diagnostic]) ->
 _NAME_IT = "ros: {nodes: {NODE: {name: /…}}}"
 
 
-def _doubted(plan: Plan, node: Node, mine: Placed, launched: Started | None) -> Iterator[Diagnostic]:
-    """An error if a node's topics depend on something that cannot be read, and the plan does not give its name: none of
-    their links could be confirmed."""
-    assert plan.launched is not None
+def _depends_on_launch(plan: Plan, node: Node, mine: Placed) -> bool:
+    """Whether only a launch file says how the node's topics are called."""
     modelled = plan.model.data if isinstance(plan.model.data, dict) else {}
     elsewhere = node.relay or node.name in {**modelled.get("compound", {}), **modelled.get("external", {})}
-    if mine.named or mine.remaps or elsewhere or not any(topic.port for topic in node.topics):
-        return
-    unread = [d for d in plan.launched.unread if not d.is_error]
-    doubts, span = (launched.unread, launched.span) if launched is not None else ((), None)
-    if launched is None and unread:
-        place = f" at {where(unread[0].span)}" if unread[0].span else ""
-        doubts, span = (f"nothing that is read starts it, and not all is read{place}: {unread[0].message}",), node.span
-    if doubts:
-        message = f"how {node.name}'s topics are called when it runs is not known: {'; '.join(doubts)}"
-        hint = f"say it in the plan, then that is taken:  ros: {{nodes: {{{node.name}: {{name: /{node.name}}}}}}}"
-        yield Diagnostic("ROS126", message, span, hint=hint)
+    return not (mine.named or mine.remaps or elsewhere) and any(topic.port for topic in node.topics)
+
+
+def _unknown(nodes: Sequence[str], why: str, span: Span | None, remedy: str | None = None) -> Diagnostic:
+    """An error for nodes whose topics depend on something that cannot be read: none of their links could be
+    confirmed."""
+    message = f"the topics of {', '.join(nodes)} have unknown names when the robot runs: {why}"
+    hint = f"or say in the plan what is taken then:  ros: {{nodes: {{{nodes[0]}: {{name: /{nodes[0]}}}}}}}"
+    hint = f"{remedy.rstrip('?')}, {hint}" if remedy is not None and remedy != HINT else hint.removeprefix("or ")
+    return Diagnostic("ROS126", message, span, hint=hint)
 
 
 def _disagreements(node: Node, mine: Placed, launched: Started) -> Iterator[Diagnostic]:

@@ -12,7 +12,7 @@ from typing import Any
 from avow.base.diagnostics import Diagnostic, Span
 from avow.base.packaged import packaged
 from avow.base.remembered import Shelf
-from avow.base.suggestions import did_you_mean, suggest
+from avow.base.suggestions import did_you_mean, nearest, suggest
 from avow.base.tools import package_version
 from avow.base.tuning.sizes import REPAIR_ROUNDS
 from avow.system.plan import Located
@@ -165,6 +165,9 @@ def _explain(error: Any, root: Piece, whole: str, also: Iterable[Any] = ()) -> I
                 yield fault(f"unknown key {key!r}", "PLAN103", piece.key_span(key), hint)
         case "required" | "dependentRequired":
             named = str(error.message).split("'")[1]
+            unknown = (key for key in piece.entries or {} if key not in error.schema.get("properties", {key}))
+            if any(nearest(key, error.schema["properties"])[:1] == [named] for key in unknown):
+                return  # the fault is the misspelled key
             yield fault(f"the key {named!r} is missing", "PLAN104")
         case "uniqueItems":
             twice = next(item for at, item in enumerate(error.instance) if item in error.instance[:at])

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import field, replace
 from typing import Any
 
@@ -132,9 +132,20 @@ def read_yaml(data: bytes, file: str) -> tuple[Piece, tuple[Diagnostic, ...]]:
             mark = begun  # what is not ended is the fault, not the line at which that is noticed
         line, column = (mark.line + 1, mark.column + 1) if mark else (1, 1)
         problem, hint = _in_words(error.problem or "not YAML")
+        if undashed := _undashed(text.splitlines(), line - 1):
+            line, problem, hint = undashed + 1, "this line begins no item of the list below", "write `- ` before it"
         raise Rejected(_error(problem, file, line, column, hint)) from None
     except yaml.YAMLError:
         raise Rejected(_error("not YAML", file, 1, 1)) from None
+
+
+def _undashed(lines: Sequence[str], at: int) -> int | None:
+    """The line before line `at` if that one begins an item of a list and this one, in the same column, does not."""
+    before = next((k for k in range(at - 1, -1, -1) if lines[k].strip() and lines[k].lstrip()[0] != "#"), None)
+    if before is None or at >= len(lines) or not lines[at].lstrip().startswith("- "):
+        return None
+    indents = {len(line) - len(line.lstrip()) for line in (lines[before], lines[at])}
+    return before if len(indents) == 1 and not lines[before].lstrip().startswith("-") else None
 
 
 _PROBLEMS = (

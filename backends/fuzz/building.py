@@ -184,6 +184,10 @@ def _first(done: Completed, reading: Reading, folder: Path) -> str:
     text = (lines or done.stderr.strip().splitlines() or [f"the compiler ended with code {done.code}"])[0]
     unnamed = re.search("(unknown type name|undeclared identifier) 'AvowNode'", text)
     missing = f"{reading.adapter.name} defines no `struct AvowNode`: " if unnamed else ""
+    if re.match(rf"{re.escape(str(folder))}\S*|(harness|replay)\.cpp", text) and LINK not in text.partition(" ")[0]:
+        missing += (
+            f"{reading.adapter.name} has no `void step(const avow::Inputs&, avow::Outputs&)` that can be called: "
+        )
     return (missing + plainly(text, reading, folder))[:300]
 
 

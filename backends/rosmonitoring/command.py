@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import os
 import signal
 import sys
 import threading
@@ -98,7 +99,10 @@ def command(
         return 0
     suffix = "" if record is None else record.suffix
     for wrong, text in (
-        (enforce and live is None, "--enforce goes with --live"),
+        (
+            live is None and any((enforce, seconds, record, verdicts)),
+            "--enforce, --for, --record, --verdicts need --live",
+        ),
         (sum(given is not None for given in (trace, live, port)) != 1, "give a TRACE, --live GRAPH or --serve PORT"),
         (live and timeline and not record, "with --live, --timeline needs --record: it is drawn from the record"),
         (suffix in (".mcap", ".bag", ".db3"), f"--record writes JSON lines, not {suffix}; --mcap writes verdicts"),
@@ -177,9 +181,14 @@ def _warn(text: str) -> None:
 
 def _judge(system: System, nodes: tuple[str, ...], trace: str, output: _Output) -> int:
 
-    running = session(system, nodes, None if trace == "-" else Path(trace), output.monitor)
+    path = Path(trace)
+    if trace != "-" and not path.exists() and (inside := system.plan.root / path).exists():
+        raise Rejected(Diagnostic("MON201", f"there is no {path}", hint=f"did you mean `{os.path.relpath(inside)}`?"))
+    if path.name == "metadata.yaml":
+        raise Rejected(Diagnostic("MON201", f"{path} is a part of a bag", hint=f"name the bag: `{path.parent}`"))
+    running = session(system, nodes, None if trace == "-" else path, output.monitor)
     # each with the line of its event; the last line if it was found at the end of the run
-    found = running.read(cast(io.BufferedReader, sys.stdin.buffer).read1) if trace == "-" else running.run(Path(trace))
+    found = running.read(cast(io.BufferedReader, sys.stdin.buffer).read1) if trace == "-" else running.run(path)
     return _report(running, found, trace, output)
 
 

@@ -419,7 +419,9 @@ class Pairing:
             return f"no message of {name} came"
         alike = known.by_key.get(asked.key)
         if not alike:
-            return f"no message of {name} has the answer's {self.answers.by}: it was lost, or `answers` pairs wrongly"
+            field = " (`_call` in JSON lines)" if self.answers.by == "call" else ""
+            said = f"no message of {name} has the answer's {self.answers.by}{field}"
+            return f"{said}: it was lost or bears none, or `answers` pairs wrongly"
         if name in self.answers.looped and any(one.time > asked.time for one in alike):
             return AFTER
         if len(alike) == 1:

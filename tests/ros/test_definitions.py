@@ -63,6 +63,7 @@ def test_the_forms_of_a_message() -> None:
     [
         ("float64 kg;", 1),
         ("float64 kg ;", 1),
+        ("float64 load // in kg", 1),
         ("uint8 OPEN=300", 1),
         ("int8 UP=\nint8 x", 1),
         ("bool B=maybe", 1),
@@ -105,13 +106,16 @@ def test_files_are_found_and_their_faults_located(tmp_path: Path) -> None:
         ("one/srv/Do.srv", "A a\n---\n"),
         ("one/msg/Bad.msg", "int32"),
         ("one/README.md", "no definition"),
+        ("three/msgs/C.msg", "int32 x"),
+        ("three/msgs/D.msg", "int32 x"),
     ):
         path = tmp_path / name
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(text, encoding="utf-8")
     known, faults = definitions([tmp_path], None)
     assert {"one/A", "one/B", "one/Do_Request", "one/Do_Response", "std_msgs/Float64"} <= set(known.messages)
-    assert sorted(d.code for d in faults) == ["ROS101", "ROS102"]
+    assert sorted(d.code for d in faults) == ["ROS101", "ROS101", "ROS102"]
+    assert [d.hint for d in faults if "three" in d.message] == ["rename it to `msg`"]
     assert all(d.span is not None for d in faults)
 
 

@@ -186,14 +186,20 @@ def test_in_ros2_included_files_share_arguments_and_namespaces(tmp_path: Path) -
         ("a.launch", '<launch>\n<node name="a" pkg="p" type="t" if="$(eval 1)"/></launch>', 2, "whether it counts"),
         ("a.launch", '<launch>\n<node name="a" pkg="p" type="t" args="$(env X)"/></launch>', 2, "arguments"),
         ("a.launch", '<launch>\n<param command="touch /tmp/x" name="p"/><mystery/></launch>', 2, "<mystery>"),
-        ("a.xml", '<launch>\n<node pkg="p" exec="e"/></launch>', 2, "its program gives it"),
+        ("a.xml", '<launch>\n<node pkg="p" exec="e"/></launch>', 2, "program gives is not known"),
         ("a.xml", '<launch>\n<node pkg="p" exec="e" name="a"><remap from="/*" to="x"/></node></launch>', 2, "'/*'"),
         ("a.py", "def generate_launch_description():\n  return LaunchDescription([f()])", 2, "f(…)"),
         (
             "a.py",
             "def generate_launch_description():\n  return LaunchDescription([Node(name='a',\n paramters=[])])",
             3,
-            "Node has no keyword `paramters`: did you mean `parameters`?",
+            "Node has no keyword `paramters`",
+        ),
+        (
+            "a.py",
+            "def generate_launch_description():\n  return LaunchDescription([Node(name='a',\n parameters={'x': 1})])",
+            3,
+            "is no list",
         ),
         (
             "a.py",

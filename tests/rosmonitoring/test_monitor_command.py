@@ -91,6 +91,8 @@ def test_a_flood_of_one_clause_hides_no_breach_of_another() -> None:
             ("broken", "broken.jsonl:2:"),
             ("timeless", "timeless.jsonl:2:"),
             ("absent", "cannot read"),
+            ("traces/metadata.yaml", "is a part of a bag"),
+            ("traces/inside.jsonl", "did you mean"),
             ("nodes", "did you mean"),
         ],
         2,
@@ -99,8 +101,12 @@ def test_a_flood_of_one_clause_hides_no_breach_of_another() -> None:
 def test_bad_input_is_code_2_with_its_place(case_folder: Path, traces: dict[str, Path], trace: str, words: str) -> None:
     if trace == "nodes":
         done = monitor(str(case_folder), str(traces["nominal"]), "--node", "agnt")
+    elif trace == "traces/inside.jsonl":
+        (case_folder / "traces").mkdir(exist_ok=True)
+        (case_folder / trace).touch()
+        done = monitor(str(case_folder), trace)
     else:
-        done = monitor(str(case_folder), str(traces.get(trace, case_folder / "absent.jsonl")))
+        done = monitor(str(case_folder), str(traces.get(trace, case_folder / trace)))
     assert done.returncode == 2
     assert words in done.stderr
     assert "Traceback" not in done.stderr
@@ -120,6 +126,7 @@ def test_a_trace_of_other_topics_is_no_success(case_folder: Path, traces: dict[s
 def test_usage(case_folder: Path) -> None:
     assert monitor(str(case_folder)).returncode == 2
     assert monitor(str(case_folder), "x", "--serve", "0").returncode == 2
+    assert "need --live" in monitor(str(case_folder), "x", "--for", "2").stderr
 
 
 def test_replies_always_carry_a_verdict_and_never_a_final_one(case: System, nominal: list[dict[str, Any]]) -> None:

@@ -203,6 +203,7 @@ def test_a_plan_that_is_no_yaml_keeps_no_fault_of_the_contract_back(tmp_path: Pa
         ("nodes:\n  a:\n    b\n    c: {}\n  d: {}\n", "a `:` stands where no key can be", 4),
         ("system: a\nnodes\nros: {}\n", "a key without its `:`", 2),
         ("nodes:\n  a:\n    - b: {}\n     c: {}\n", "this line is indented as none above it", 4),
+        ("nodes:\n  a:\n    b: {}\n    - c: {}\n", "this line begins no item of the list below", 3),
         ("nodes:\n  a: {b: }}\n", "a `}` closes no bracket", 2),
         ("nodes:\n     - a: {}\n    - b: {}\n", "this line is indented as none above it", 3),
         ('system: "home\n', "a quotation mark or a bracket is not closed", 1),

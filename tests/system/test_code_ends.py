@@ -88,6 +88,7 @@ FAULTS: list[tuple[list[tuple[str, str, str]], list[str]]] = [
     ([STRICT, ("plan.yaml", f"nodes:\n    {CODE}", "qos: qos.txt")], ["ROS131e watch.py:10 qos.txt:2"]),
     ([("plan.yaml", f"nodes:\n    {CODE}", "qos: watch.yaml")], ["ROS136e watch.yaml:1"]),
     ([("watch.py", '"scan"', '"scans"')], ["ROS133e system.rcl:12 watch.py:10"]),
+    ([("watch.py", '"scan"', '"other"')], ["ROS133e system.rcl:12 watch.py:10"]),
     ([("camera.cpp", "Float64", "Int32")], ["ROS133e system.rcl:5 camera.cpp:4"]),
     ([("watch.py", "SetBool", "Trigger")], ["ROS133e system.rcl:12 watch.py:11"]),
     ([("camera.cpp", "create_publisher", "create_subscription")], ["ROS133e system.rcl:5 camera.cpp:4"]),

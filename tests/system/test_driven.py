@@ -54,6 +54,7 @@ SERVE = "self.create_service(int, '/s', self.serve)"
         (TICK, "def tick(self, event): pass", "write `def tick(self)`"),
         (SERVE, "def serve(self, r): pass", "write `def serve(self, request, response)`"),
         ("rospy.Subscriber('/x', int, self.heard)", "def heard(): pass", "write `def heard(self, message)`"),
+        (SERVE, "def serve(self, r): return response", "write `def serve(self, request, response)`"),
         ("rospy.Timer(1, self.tick)", "def tick(self): pass", "write `def tick(self, event)`"),
     ],
 )  # fmt: skip

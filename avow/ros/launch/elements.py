@@ -51,16 +51,16 @@ class WrongLaunch(Exception):  # noqa: N818 - it is what was found wrong
         self.line = line
 
 
+HINT = "say what it does under `ros: {nodes: …}`, or give the value as `args` of the launch file in the plan"
+
+
 def place(file: str, line: int, column: int = 1) -> Span:
     return Span(file, line, column, line, column + 1)
 
 
-def unread(span: Span, message: str) -> Diagnostic:
+def unread(span: Span, message: str, hint: str = HINT) -> Diagnostic:
     """A diagnostic for a part that is not read, with its place."""
-    return Diagnostic("ROS121", message, span, Severity.WARNING, HINT)
-
-
-HINT = "say what it does under `ros: {nodes: …}`, or give the value as `args` of the launch file in the plan"
+    return Diagnostic("ROS121", message, span, Severity.WARNING, hint)
 
 
 def literal(text: str) -> Text:

@@ -17,7 +17,18 @@ from avow.base.python_names import unbound
 from avow.base.records import dataclass
 from avow.base.suggestions import nearest
 from avow.base.tuning.sizes import LAUNCH_ELEMENTS
-from avow.ros.launch.elements import VARIABLE, Element, Parsed, Text, Unread, WrongLaunch, joined, literal, unread
+from avow.ros.launch.elements import (
+    HINT,
+    VARIABLE,
+    Element,
+    Parsed,
+    Text,
+    Unread,
+    WrongLaunch,
+    joined,
+    literal,
+    unread,
+)
 
 _NODES = {
     "Node": "node",
@@ -221,7 +232,8 @@ class _Python:
             elif keyword.arg is None:
                 texts["args"] = Unread("its keywords are not written out")
             elif keyword.arg not in _OTHERS and (near := nearest(keyword.arg, (*_RENAMED, *_READ), alike=0.75)):
-                self.tell(keyword.value, f"{_called(call)} has no keyword `{keyword.arg}`: did you mean `{near[0]}`?")
+                message = f"{_called(call)} has no keyword `{keyword.arg}`"
+                self.tell(keyword.value, message, f"did you mean `{near[0]}`?")
         return Element(tag, {**texts, **self.condition(call)}, tuple(children), self.at(call))
 
     def remaps(self, node: ast.expr) -> list[Element]:
@@ -238,6 +250,8 @@ class _Python:
     def parameters(self, node: ast.expr) -> list[Element]:
         """Files and mappings; those that cannot be read are left out."""
         found: list[Element] = []
+        if isinstance(self.value(node), ast.Dict):
+            self.tell(node, "`parameters` is no list, which launch_ros refuses", "write `parameters=[{…}]`")
         for item in self.items(node) or [node]:
             value = self.value(item)
             if isinstance(value, ast.Dict):
@@ -399,9 +413,9 @@ class _Python:
     def at(self, node: ast.expr | ast.stmt) -> Span:
         return Span(self.file, node.lineno, node.col_offset + 1, node.end_lineno or 0, (node.end_col_offset or 0) + 1)
 
-    def tell(self, node: ast.expr | ast.stmt, message: str) -> None:
+    def tell(self, node: ast.expr | ast.stmt, message: str, hint: str = HINT) -> None:
         self.seen.add(id(node))
-        self.found.unread.append(unread(self.at(node), message))
+        self.found.unread.append(unread(self.at(node), message, hint))
 
 
 _THIS_FILE = ("__file__", "os.path.abspath(__file__)", "os.path.realpath(__file__)")
