@@ -94,6 +94,13 @@ class Topic:
     name: str
     port: Port | None
     span: Span | None = field(default=None, compare=False, repr=False)
+    frame: str = ""
+    """The frame in which the contract speaks of its messages' geometry; empty: none."""
+
+    @property
+    def kind(self) -> str:
+        """``geometry_msgs/PoseStamped in map``."""
+        return f"{self.ros_type} in {self.frame}" if self.frame else self.ros_type
 
 
 @dataclass(frozen=True, slots=True)

@@ -30,7 +30,7 @@ SECTION_FORMS = {
 _DECLARATION = "write `Name : type;` or `Name = value;`"
 _DEFINITION = "a definition is written `define name(i : NATURAL) = F;`"
 _PORT = "write `name : TYPE`, separated by commas"
-_TOPIC = "write `package/Type name matches(in.variable)`, separated by commas; one topic for each variable"
+_TOPIC = "write `package/Type name [in frame] matches(in.variable)`, separated by commas; one topic for each variable"
 _TYPE = (
     "types are `REAL`, `{red, green}`, `{move(REAL), stop}`, `A x B --> C`, `(A, B)`, `<A>`, `[x : REAL]`; ROS types "
     "stand in `topics`"

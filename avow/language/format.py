@@ -317,6 +317,7 @@ def _port(found: Sequence[Token]) -> str:
 
 def _topic(tree: syntax.TopicDeclaration) -> str:
     line = f"{'/'.join(name.text for name in tree.type.names)} {tree.name.text}"
+    line += f" in {tree.frame.text}" if tree.frame is not None else ""
     role = f"{tree.role}." if tree.role is not None else ""
     return line if tree.port is None else f"{line} matches({role}{tree.port.text})"
 

@@ -212,9 +212,8 @@ def _topics(node: NodeSyntax, scope: Scope, reports: Reports) -> Iterable[Topic]
         port = _matched(tree.role, tree.port, scope, reports) if tree.port is not None else None
         if tree.port is not None and port is None:
             continue
-        topic = Topic(
-            "/".join(part.text for part in tree.type.names), name.text, port, reports.source.span(tree.start, tree.end)
-        )
+        span, frame = reports.source.span(tree.start, tree.end), tree.frame.text if tree.frame is not None else ""
+        topic = Topic("/".join(part.text for part in tree.type.names), name.text, port, span, frame)
         earlier = seen.setdefault(part_topic(name.text, topic.ros_type), [])  # a service has two types: its parts
         if _goes_with(topic, earlier, name, reports):
             earlier.append(topic)
@@ -223,22 +222,22 @@ def _topics(node: NodeSyntax, scope: Scope, reports: Reports) -> Iterable[Topic]
 
 def _goes_with(topic: Topic, earlier: Sequence[Topic], name: Token, reports: Reports) -> bool:
     """Whether a topic may be listed in addition to the earlier entries; reports it if not."""
-    other = next((t for t in earlier if _same_type(t) != _same_type(topic) or t.port in (None, topic.port)), None)
+    other = next((t for t in earlier if _same(t) != _same(topic) or t.port in (None, topic.port)), None)
     other = other or (earlier[0] if earlier and topic.port is None else None)
     if other is None:
         return True
-    types = f", as {other.ros_type} and as {topic.ros_type}" if other.ros_type != topic.ros_type else ""
+    types = f", as {other.kind} and as {topic.kind}" if _same(other) != _same(topic) else ""
     message = f"the topic `{topic.name}` is listed twice{types}"
-    hint = "a topic has one type, and is listed once, or once for each variable with `matches(…)`"
+    hint = "a topic has one type and one frame, and is listed once, or once for each variable with `matches(…)`"
     notes = ((f"`{topic.name}` is first listed here", other.span),)
     reports.error("RCL216", message, name.start, name.end, hint=hint, notes=notes)
     return False
 
 
-def _same_type(topic: Topic) -> tuple[str, ...]:
-    """A topic's type in a form common to ROS 1 and 2: ``package/msg/Type`` is ``package/Type``."""
+def _same(topic: Topic) -> tuple[str, ...]:
+    """A topic's frame, and its type in a form common to ROS 1 and 2: ``package/msg/Type`` is ``package/Type``."""
     parts = topic.ros_type.split("/")
-    return (parts[0], parts[-1], *(p for p in parts[1:-1] if p != "msg"))
+    return (topic.frame, parts[0], parts[-1], *(p for p in parts[1:-1] if p != "msg"))
 
 
 def _check_ros_type(tree: RosType, reports: Reports) -> None:

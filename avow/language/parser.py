@@ -69,6 +69,12 @@ def _accepted(start: str, tokens: Iterable[Token]) -> frozenset[str]:
     return frozenset(machine.accepts())
 
 
+def _topic(c: list[Any], matched: list[Any]) -> syntax.TopicDeclaration:
+    frame = c[3] if len(c) - len(matched) > 2 else None
+    role, port = (matched[2].text if len(matched) > 4 else None, matched[-2]) if matched else (None, None)
+    return _made(syntax.TopicDeclaration, c, c[0], c[1], role, port, frame)
+
+
 def _callbacks() -> SimpleNamespace:
     return SimpleNamespace(**_CALLBACKS)
 
@@ -158,9 +164,7 @@ _CALLBACKS: dict[str, Callable[[list[Any]], Any]] = {
     "parameter": lambda c: tuple(replace(port, marker=c[0]) for port in c[1]),
     "port": lambda c: tuple(_made(syntax.PortDeclaration, (name, c[-1]), name, c[-1]) for name in c[:-2:2]),
     "topics": lambda c: _made(syntax.TopicList, c, tuple(c[::2])) if c else syntax.TopicList(0, 0, 1, ()),
-    "topic": lambda c: _made(
-        syntax.TopicDeclaration, c, c[0], c[1], c[4].text if len(c) > 6 else None, c[-2] if len(c) > 2 else None
-    ),
+    "topic": lambda c: _topic(c, c[2:] if len(c) < 3 or c[2].type != "IN" else c[4:]),
     "ros_type": lambda c: _made(syntax.RosType, c, tuple(c[::2])),
     # types
     "function_type": lambda c: _made(syntax.FunctionType, c, c[0], c[2]),

@@ -370,12 +370,13 @@ class RosType(_Placed):
 
 @dataclass(frozen=True, slots=True)
 class TopicDeclaration(_Placed):
-    """``package/Type name matches(in.port)``; `role` and `port` are None if they are not given."""
+    """``package/Type name in frame matches(in.port)``; `role`, `port` and `frame` are None if they are not given."""
 
     type: RosType
     name: Token
     role: str | None
     port: Token | None
+    frame: Token | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -106,7 +106,8 @@ def _head(clause: Clause) -> str:
 
 def _topic(topic: Topic) -> str:
     matched = f" matches({topic.port.role}.{topic.port.name})" if topic.port is not None else ""
-    return f"{topic.ros_type} {topic.name}{matched}"
+    frame = f" in {topic.frame}" if topic.frame else ""
+    return f"{topic.ros_type} {topic.name}{frame}{matched}"
 
 
 # --- for people ------------------------------------------------------------------------------------------------------

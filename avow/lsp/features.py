@@ -192,5 +192,5 @@ def _about_port(port: Port, node: Node) -> str:
     shown = show_type(port.sort)
     more = f" = `{shown}`" * (shown != port.type_name) + f" in {port.unit}" * bool(port.unit)
     topics = [t for t in node.topics if t.port == port]
-    carried = "".join(f"\n\ntopic `{t.name}` of `{t.ros_type}`" for t in topics)
+    carried = "".join(f"\n\ntopic `{t.name}` of `{t.kind}`" for t in topics)
     return f"`{port.role}.{port.name}` : `{port.type_name}`{more} ({words[port.role]} of {_plain(node.name)}){carried}"

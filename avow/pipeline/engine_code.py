@@ -16,6 +16,7 @@ _ROOMS = (
     "base",
     "isolation",
     "ros",
+    "drive",
     "language",
     "system",
     "formulas",
@@ -25,7 +26,7 @@ _ROOMS = (
     "calculus",
     "kernel",
 )
-_ROOMS_OF_BACKENDS = (*_ROOMS, "backend_kit", "drive")
+_ROOMS_OF_BACKENDS = (*_ROOMS, "backend_kit")
 """What an answer can depend on. What only renders, records or schedules cannot change one."""
 
 _PACKAGE = Path(avow.__file__).parent

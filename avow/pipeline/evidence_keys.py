@@ -169,4 +169,5 @@ def _upstream_node(job: Job, name: str, backend: str) -> list[Any]:
 
 
 def _topics(node: Node) -> list[list[str]]:
-    return sorted([t.ros_type, t.name, t.port.variable.qualified if t.port else ""] for t in node.topics)
+    port = {t: t.port.variable.qualified if t.port else "" for t in node.topics}
+    return sorted([t.ros_type, t.name, port[t], *([t.frame] if t.frame else [])] for t in node.topics)

@@ -27,11 +27,17 @@ from avow.system.plan import Driving, Edge, Endpoint, Plan
 
 @dataclass(frozen=True, slots=True)
 class Carrier:
-    """The topic that carries a port: its whole name, and its messages' type."""
+    """The topic that carries a port: its whole name, its messages' type, and their frame, if the contract names it."""
 
     topic: str
     kind: str
     span: Span | None = None
+    frame: str = ""
+
+    @property
+    def shown(self) -> str:
+        """``geometry_msgs/PoseStamped in map``."""
+        return f"{self.kind} in {self.frame}" if self.frame else self.kind
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,7 +75,7 @@ def ends(nodes: Sequence[Node], names: Resolver) -> Ends:
             if topic.port is None:
                 continue
             at = Endpoint(node.name, topic.port.name)
-            carrier = Carrier(whole_name(names, node, topic), canonical(topic.ros_type), topic.span)
+            carrier = Carrier(whole_name(names, node, topic), canonical(topic.ros_type), topic.span, topic.frame)
             if topic.port.role is Role.INPUT:
                 inputs[at] = (*inputs.get(at, ()), carrier)
             else:
@@ -79,15 +85,15 @@ def ends(nodes: Sequence[Node], names: Resolver) -> Ends:
 
 
 def wrong_types(found: Ends) -> Iterator[Diagnostic]:
-    """Topics whose ends have different message types: ROS does not connect them. The most frequent type is taken as
-    meant."""
+    """Topics whose ends have different message types, which ROS does not connect, or frames. The most frequent is taken
+    as meant."""
     first: dict[str, tuple[Endpoint, Carrier]] = {}
     every = [(at, one) for at, some in (*found.outputs.items(), *found.inputs.items()) for one in some]
-    often = Counter((carrier.topic, carrier.kind) for _, carrier in every)
-    for at, carrier in sorted(every, key=lambda each: -often[each[1].topic, each[1].kind]):
+    often = Counter((carrier.topic, carrier.shown) for _, carrier in every)
+    for at, carrier in sorted(every, key=lambda each: -often[each[1].topic, each[1].shown]):
         known = first.setdefault(carrier.topic, (at, carrier))
-        if known[1].kind != carrier.kind:
-            message = f"{carrier.topic} is {carrier.kind} at {at}, and {known[1].kind} at {known[0]}"
+        if known[1].shown != carrier.shown:
+            message = f"{carrier.topic} is {carrier.shown} at {at}, and {known[1].shown} at {known[0]}"
             near = did_you_mean(carrier.kind, [known[1].kind])
             hint = near or "correct one, or remap one end under `ros: {nodes: …}`"
             notes = ((f"{known[0]} is here", known[1].span),)
@@ -310,7 +316,7 @@ def _relay(
     for each in outside:
         called = f"outside{each.topic.replace('/', '_')}"
         inputs.append(Port(Role.INPUT, called, port.sort, port.type_name, each.span))
-        topics.append(Topic(each.kind, each.topic, inputs[-1], each.span))
+        topics.append(Topic(each.kind, each.topic, inputs[-1], each.span, each.frame))
     output = Port(Role.OUTPUT, port.name, port.sort, port.type_name, carrier.span)
     said = " or ".join([*(str(at) for at, _ in sources), *(f"the environment on {c.topic}" for c in outside)])
     formula = Or(tuple(_same(output.variable, wire.variable) for wire in inputs))

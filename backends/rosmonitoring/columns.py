@@ -117,6 +117,8 @@ class Watch:
         setup, answers = monitor.setup, None if monitor.pairing is None else monitor.pairing.answers
         if not names or not monitor.by_values or not (setup.shared.keys() | setup.rates.keys()).isdisjoint(names):
             return None
+        if any(setup.carried[name].frame for name in names):
+            return None
         found = monitor.about(names)
         if any(watched.held or not watched.outputs <= set(names) for watched in found):
             return None

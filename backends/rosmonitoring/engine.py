@@ -20,6 +20,7 @@ from avow.formulas.temporal.cells import remembers
 from avow.formulas.values import Value
 from avow.language.contract import Clause, ClauseKind
 from avow.ros.bags import LIVE, publisher
+from avow.ros.frames import TREE, Tree
 
 from . import answers
 from .latest import Doubts, SoFar, hear, judge_latest, not_met, overdue, pass_between, soonest, verdict_of
@@ -28,10 +29,10 @@ from .options import Setup, same_topic
 from .pace import SIMULATED, By, Clock, Passage, Timing
 from .pairing import NUMBER, Asked, Choices, Pairing, Replies, Ticks, backwards, ticks, time_of
 from .reading import Reader, reader
-from .rules import Choice, Constant, Fields, Previous, heard_through, of_latest
+from .rules import Choice, Constant, Fields, Previous, framed, heard_through, of_latest
 from .tuning import OPEN_QUESTIONS, TOPICS_KEPT
 from .watched import Answer, Fault, Heard, Part, Tally, Violation, Watched, shown, time_text
-from .wires import MappingError
+from .wires import MappingError, Unplaced
 from .word import Message, Word, follow, word_of
 
 
@@ -81,6 +82,8 @@ class Monitor:
     _latest: Fraction | None = None
     unread: dict[str, str] = field(default_factory=dict)
     """The variables of which a message could not be read, and why the first could not."""
+    tree: Tree | None = None
+    """The transforms of the run, if the contract names frames."""
     supposed: set[str] = field(default_factory=set)
     """The variables that have an initial value of the plan, and no message yet."""
     questions: int = OPEN_QUESTIONS
@@ -119,6 +122,7 @@ class Monitor:
             self._watch(clause)
 
     def _observe(self) -> None:
+        self.tree = Tree() if framed(self.setup.rules.values()) else None
         for name, rule in self.setup.rules.items():
             self.versions[name] = self.versions.get(name, 0) + 1
             match rule:
@@ -128,7 +132,8 @@ class Monitor:
                     self.previous.append((name, source))
                     self.values |= {} if initial is None else {name: initial}
                 case Fields() | Choice():
-                    self._readers.setdefault(same_topic(rule.topic), []).append((name, reader(rule)))
+                    read = reader(rule, self.tree, self.setup.known)
+                    self._readers.setdefault(same_topic(rule.topic), []).append((name, read))
                     self.values |= {} if rule.initial is None else {name: rule.initial}
                     if rule.initial is not None and of_latest(rule):
                         self.supposed.add(name)  # an empty set of tuples seen so far is an observation
@@ -139,7 +144,8 @@ class Monitor:
     def listens(self, topic: str) -> bool:
         """Whether a topic's messages concern the node, or its time."""
         known = same_topic(topic)
-        return known in self._readers or (known == SIMULATED and self.setup.time is By.SIM)
+        timed = known == SIMULATED and self.setup.time is By.SIM
+        return known in self._readers or timed or (known in TREE and self.tree is not None)
 
     def step(self, event: Mapping[str, Any], place: int = 0) -> list[Violation]:
         """Judge one event, at a place of the trace (by default, its number). Never raises, whatever the event
@@ -160,6 +166,8 @@ class Monitor:
         readers = self._readers.get(same_topic(topic)) if isinstance(topic, str) else None
         if isinstance(topic, str) and len(self.heard) < TOPICS_KEPT:
             self.heard.add(same_topic(topic))
+        if self.tree is not None and isinstance(topic, str) and same_topic(topic) in TREE and not self.tree.whole:
+            self.tree.hear(same_topic(topic), event)
         if LIVE in event and self.by_arrival and self.doubts is None:
             self.doubts = Doubts.beginning(self.values)
         readers = answers.own(self, readers, event) if readers and self.setup.shared else readers
@@ -203,7 +211,7 @@ class Monitor:
             try:
                 new = read(event, old)
             except MappingError as error:
-                if self.tallies:  # a node without clauses to judge misses no value
+                if self.tallies and not isinstance(error, Unplaced):  # a node without clauses to judge misses no value
                     found.append(self.violation(Fault.MAPPING, name, event, str(error)))
                 self.unread.setdefault(name, str(error))
                 self.miss({name})

@@ -17,8 +17,8 @@ from avow.ros.bags import Origin
 from .judged import as_float
 from .options import Setup, same_topic
 from .reading import Reader, reader
-from .rules import heard_through
-from .traces import read_trace
+from .rules import framed, heard_through
+from .traces import read_trace, transforms
 from .tuning import TIMELINE_EVENTS, WORD_LENGTH
 from .watched import Fault, Violation, time_text
 from .wires import MappingError
@@ -71,9 +71,12 @@ def signals(
     sample of the events is read, and those at which the marks begin. Raises Rejected."""
     every = max(1, -(-events // TIMELINE_EVENTS))
     readers: dict[str, list[tuple[Setup, str, Sort, Reader]]] = {}
+    setups = tuple(setups)
+    tree = transforms(path, where) if any(framed(setup.rules.values()) for setup in setups) else None
     for setup in setups:
         for name, rule in setup.carried.items():
-            readers.setdefault(same_topic(rule.topic), []).append((setup, name, rule.variable.sort, reader(rule)))
+            read = reader(rule, tree, setup.known)
+            readers.setdefault(same_topic(rule.topic), []).append((setup, name, rule.variable.sort, read))
     found: dict[tuple[str, str], pictures.Columns[pictures.Stretch]] = {}
     start = end = ""
     marked = marks.events()

@@ -100,7 +100,8 @@ def reading(name: str, rule: Rule) -> str:
                 parts.append((shown(path) or "the message") + (f" : {wire}" if wire else ""))
             taken = f"{rule.take} of " if rule.take else ""
             each = f" of each of {shown(rule.each)}" if rule.each else ""
-            return f"{name} ← {taken}{', '.join(parts)}{each} ({rule.topic})"
+            frame = f" in {rule.frame}" if rule.frame else ""
+            return f"{name} ← {taken}{', '.join(parts)}{each} ({rule.topic}{frame})"
         case Choice():
             return f"{name} ← {shown(rule.tag)} and its arguments ({rule.topic})"
         case Constant() | Previous():  # from the scenario, or the step before

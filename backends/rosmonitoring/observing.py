@@ -14,7 +14,7 @@ from avow.base.suggestions import nearest, suggest
 from avow.formulas.values import FunctionValue, Value
 from avow.language import sorts as s
 from avow.language.contract import Node, Port
-from avow.language.terms import Variable
+from avow.language.terms import Role, Variable
 from avow.ros.definitions import INTEGERS, SCALARS, Array, Definitions, Message, Nested, NoField, Scalar, Wire
 from avow.system.graph import dataflow
 from avow.system.plan import Endpoint, Located, Plan, System, Table
@@ -43,6 +43,8 @@ class Observed:
     message: Message | str
     """Its definition, or the type's name if nothing defines it."""
     known: Definitions
+    frame: str
+    """The frame in which the contract speaks of it; empty: as it is."""
 
     @property
     def variable(self) -> Variable:
@@ -81,7 +83,7 @@ def observe(at: Observed, entry: Mapping[str, Any]) -> Rule | str:
     wires, names = _wires(at, paths, each, entry, take)
     rule = Fields(
         variable, at.topic, paths, names, hold, each, default, initial, wires, at.known if wires else NOTHING_KNOWN,
-        take, gaps, at.kind,
+        take, gaps, at.kind, at.frame,
     )  # fmt: skip
     _check_gaps(rule)
     return rule
@@ -243,7 +245,7 @@ def _choice(at: Observed, sort: s.DataSort, entry: Mapping[str, Any], initial: V
         if word not in known:
             raise Wrong(f"{sort.name} has no constructor {word!r}", "values", hint=suggest(word, known))
     _check_crossed(names, list(known))
-    return Choice(at.variable, at.topic, tag, arguments, names, initial, wires, at.kind)
+    return Choice(at.variable, at.topic, tag, arguments, names, initial, wires, at.kind, at.frame)
 
 
 def _field(at: Observed, way: FieldPath, sort: s.Sort, *place: str | int) -> Wire | None:
@@ -411,6 +413,15 @@ def sources(system: System, node: Node, port: str) -> list[Endpoint]:
     heard = [e for e in graph.feeding(node.name) if e.target.port == port]
     each = (graph.feeding(e.source.node) if e.source.node in graph.relays else (e,) for e in heard)
     return [edge.source for edges in each for edge in edges]
+
+
+def frame_of(system: System, node: Node, port: Port) -> str:
+    """The frame of its topic, otherwise of the topic of an output that it receives."""
+    ends = [(node, port)]
+    for at in sources(system, node, port.name) if port.role is Role.INPUT else ():
+        other = system.contract.node(at.node)
+        ends.append((other, other.output(at.port)))
+    return next((t.frame for owner, end in ends for t in owner.topics if t.port == end and t.frame), "")
 
 
 def published(system: System, node: Node, port: str) -> Any:

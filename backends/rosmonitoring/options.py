@@ -392,7 +392,8 @@ class _Work:
     def observed(self, port: Port, topic: str, kind: str | None, entry: Any) -> Rule | str:
         entry = observing.written_out(entry)
         try:
-            about = observing.Observed(self.system.plan, port, topic, self.message(kind, entry), self.known)
+            message, frame = self.message(kind, entry), observing.frame_of(self.system, self.node, port)
+            about = observing.Observed(self.system.plan, port, topic, message, self.known, frame)
             return observing.observe(about, entry)
         except Undecided as undecided:
             if self.asked(port):

@@ -11,18 +11,53 @@ from avow.base.plain import listed
 from avow.formulas.values import Data, FunctionValue, Value
 from avow.language import sorts as s
 from avow.language.sorts import EnumSort, IntegerSort, NaturalSort, RealSort, Sort
+from avow.ros import frames
 from avow.ros.bags import ENVELOPE, Event, message_of
 from avow.ros.definitions import INTEGERS, Array, Definitions, Message, Nested, Scalar, Wire
 
 from .rules import Argument, Choice, FieldPath, Fields, Hold, Lookup
 from .tuning import CANDIDATES_SHOWN
-from .wires import Convert, MappingError, NoReading, converter, fits, meant, of_type, parts_of, show, table_of, taken
+from .wires import (
+    Convert,
+    MappingError,
+    NoReading,
+    Unplaced,
+    converter,
+    fits,
+    meant,
+    of_type,
+    parts_of,
+    show,
+    table_of,
+    taken,
+)
 
 Reader = Callable[[Event, Value | None], Value]
 """(the message, the variable's value so far) → its new value. Raises MappingError."""
 
 
-def reader(rule: Fields | Choice) -> Reader:
+def reader(rule: Fields | Choice, tree: frames.Tree | None, known: Definitions) -> Reader:
+    """`tree`: the transforms of the run, for a rule with a frame."""
+    read = _reader(rule)
+    if tree is None or not rule.frame:
+        return read
+
+    def placed(message: Event, old: Value | None) -> Value:
+        try:
+            moved = tree.placed(message, rule.kind, known, rule.frame)
+        except frames.Unplaced as why:
+            raise Unplaced(str(why)) from None
+        try:
+            return read(moved, old)
+        except MappingError as error:
+            if moved is message:
+                raise
+            raise Unplaced(f"it is not in the frame {rule.frame}, and what is transformed lacks it: {error}") from None
+
+    return placed
+
+
+def _reader(rule: Fields | Choice) -> Reader:
     match rule:
         case Choice():
             return _choice(rule)

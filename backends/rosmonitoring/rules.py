@@ -84,6 +84,8 @@ class Fields:
     gaps: frozenset[Gap] = frozenset()
     kind: str = ""
     """The topic's type, if it is known."""
+    frame: str = ""
+    """The frame in which the contract speaks of its messages; empty: as they are."""
 
     def wire(self, at: int) -> Wire | None:
         """The type of the field at a path."""
@@ -105,6 +107,7 @@ class Choice:
     wires: Mapping[FieldPath, Wire] = field(default_factory=dict, hash=False)
     """The types of fields, if they are known."""
     kind: str = ""
+    frame: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -142,6 +145,11 @@ def heard_through(rule: Rule) -> str:
             return ""
         case Fields(variable=variable) | Choice(variable=variable):
             return variable.qualified
+
+
+def framed(rules: Iterable[Rule]) -> bool:
+    """Whether the contract names the frame of a topic that is read."""
+    return any(getattr(rule, "frame", "") for rule in rules)
 
 
 def otherwise(one: Rule, other: Rule) -> bool:

@@ -38,7 +38,7 @@ from .overhead import overheads
 from .pairing import Answers
 from .rml.translate import translate
 from .session import Session
-from .traces import Recorded, read_trace
+from .traces import Recorded, read_trace, transforms
 from .verdicts import Run, Shown, outcome
 from .watched import Fault, Tally, Violation
 
@@ -240,6 +240,8 @@ def steps(job: Job, traces: Iterable[str]) -> Iterator[tuple[Mapping[str, Value]
         if path is None:
             raise Rejected(Diagnostic("MON102", f"traces: {name!r} is outside the system's folder"))
         monitor = Monitor(replace(found, answers=ARRIVAL, fresh={}, rates={}), ())
+        if monitor.tree is not None:
+            monitor.tree.fill(transforms(path, origin(job.system)))
         yield tuple(_steps(monitor, read_trace(path, origin(job.system), monitor.listens)))
 
 

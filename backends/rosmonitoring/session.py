@@ -28,7 +28,7 @@ from .notes import readable
 from .observing import NAME, method_of
 from .options import Setup, known_types, origin, same_topic, setup
 from .rules import NOTHING_KNOWN
-from .traces import opened
+from .traces import opened, transforms
 from .watched import Fault, Tally, Violation, remedies
 
 RAW = "_mon"
@@ -149,6 +149,11 @@ class Session:
 
     def judged(self, path: Path) -> Iterator[tuple[int, list[Violation]]]:
         """As `run`: lines, and the violations there, often none, so that the caller can check the clock."""
+        trees = [monitor.tree for monitor in self.monitors if monitor.tree is not None]
+        if trees:
+            recorded_tree = transforms(path, origin(self.system))
+            for tree in trees:
+                tree.fill(recorded_tree)
         columns = Columns(self.monitors, self.with_causes, self.heard)
         return self._whole(self._of_bag(path, columns) if is_bag(path) else columns.run(path))
 

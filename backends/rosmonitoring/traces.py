@@ -13,6 +13,7 @@ from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.base.suggestions import nearby, nearest
 from avow.ros import bags
 from avow.ros.bags import NOWHERE, Carried, Event, Origin, is_bag
+from avow.ros.frames import TREE, Tree
 
 from .tuning import CHUNK, EVENT_CHARACTERS, LATEST_TIME
 from .wires import NotANumber, exact
@@ -120,6 +121,16 @@ def read_trace(
         raise _not_text(str(path)) from None
     except OSError as error:
         raise unread(path, error) from None
+
+
+def transforms(path: Path, origin: Origin) -> Tree:
+    """All transforms that a trace holds. Raises Rejected."""
+    tree = Tree()
+    for recorded in read_trace(path, origin, lambda topic: topic.removeprefix("/") in TREE):
+        topic = str(recorded.event.get("topic")).removeprefix("/")
+        if topic in TREE:
+            tree.hear(topic, recorded.event)
+    return tree
 
 
 def unread(path: Path, error: OSError) -> Rejected:

@@ -87,6 +87,10 @@ class NoReading(MappingError):  # noqa: N818 - it names what was found
     """The field holds a value that the plan declares as no reading."""
 
 
+class Unplaced(MappingError):  # noqa: N818 - it names what was found
+    """The message is not in the contract's frame, and cannot be put into it: nothing is judged."""
+
+
 def fits(sort: s.Sort, wire: Wire, known: Definitions) -> bool:
     """Whether a field of the type may carry a value of the sort (enumerations' words are checked separately)."""
     match sort, wire:

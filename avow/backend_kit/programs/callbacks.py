@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from avow.backend_kit.programs.cpython import Replies, Subject, ask
-from avow.backend_kit.programs.samples import Pool, leaves, numbers_of, pool, written
+from avow.backend_kit.programs.samples import Pool, leaves, numbers_of, pool, words_of, written
 from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.base.files import inside, read_text
 from avow.base.process import ToolMissing
@@ -22,7 +22,6 @@ from avow.base.suggestions import did_you_mean, nearest, suggest
 from avow.base.tuning.running import DRIVEN_CALLBACKS, DRIVEN_MEGABYTES, DRIVEN_SECONDS, LONGEST_GAP, NUMBERS_AGAIN
 from avow.isolation.observed import Seen
 from avow.language.contract import Node, Topic
-from avow.language.sorts import DataSort, EnumSort
 from avow.language.terms import Role
 from avow.ros.bags import fields_of
 from avow.ros.calls import CALL, is_part
@@ -178,9 +177,10 @@ class Driver:
         topics = sorted(self.inputs)
         numbers = numbers_of(clause.formula for clause in (*self.node.assumptions, *self.node.guarantees))
         numbers = numbers | set(written(self.text)) | set(leaves(self.subject.params))
-        words = sorted({word for port in (*self.node.inputs, *self.node.outputs) for word in _words(port.sort)})
+        words = sorted({w for port in (*self.node.inputs, *self.node.outputs) for w in words_of(port.sort)})
         drawing = _Drawing(pool(numbers), words, self.known, chance, _FRAMES.findall(self.text))
         at = 0  # nanoseconds
+        placed = {whole_name(self.system.plan.ros.names, self.node, t): t.frame for t in self.node.topics}
         alike: dict[str, Sequence[str]] = {topic: group for group in self.topics.together for topic in group}
         due: list[str] = []
         for _ in range(messages if topics else 0):
@@ -190,6 +190,7 @@ class Driver:
                 due += others if others and chance.random() > NUMBERS_AGAIN else ()
                 at += drawing.gap()
             kind = self.topics.heard[topic := due.pop()]
+            drawing.frame = placed.get(topic, "")
             made = drawing.message(Nested(kind), at)
             before = drawing.made.setdefault(kind, [])
             made = _with_floats(made, chance.choice(before)) if before and chance.random() < NUMBERS_AGAIN else made
@@ -412,12 +413,6 @@ def shown(wire: Wire, data: Any, known: Definitions, kind: Driving) -> Any:
             return float.fromhex(data["f"]) if name.startswith("float") else data
 
 
-def _words(sort: Any) -> tuple[str, ...]:
-    if isinstance(sort, DataSort):
-        return tuple(constructor.name for constructor in sort.constructors)
-    return sort.members if isinstance(sort, EnumSort) else ()  # numbers are drawn separately, other sorts have no words
-
-
 def _with_floats(made: Any, before: Any) -> Any:
     """A message with the floats of an earlier one of its type: a robot arrives where it was sent."""
     match made, before:
@@ -440,6 +435,7 @@ class _Drawing:
     chance: random.Random
     frames: Sequence[tuple[str, str]]
     """Pairs of frames whose transforms the program looks up."""
+    frame: str = ""  # of the contract's topic, if it names one
     last: float = 0.0
     made: dict[str, list[Any]] = field(default_factory=dict)
     """Type → the messages so far."""
@@ -465,8 +461,8 @@ class _Drawing:
             case Nested(name=name):
                 message = self.known.get(name)
                 assert message is not None
-                inner = [(f, at if f.wire == Scalar("time") and name == HEADER else None) for f in message.fields]
-                return {"d": [[f.name, self.message(f.wire, at) if t is None else {"i": str(t)}] for f, t in inner]}
+                given = {"stamp": {"i": str(at)}, "frame_id": self.frame} if name == HEADER else {}
+                return {"d": [[f.name, given.get(f.name) or self.message(f.wire, at)] for f in message.fields]}
             case Array(item=item, length=length):
                 number = self.chance.choice(self.numbers.lengths) if length is None else length
                 return {"l": [self.message(item, at) for _ in range(number)]}

@@ -16,7 +16,7 @@ from typing import Any
 from avow.base.records import dataclass
 from avow.base.tuning.running import SAMPLE_LENGTHS, SAMPLE_TRIES, SAMPLES_SHIFTED
 from avow.language.bounds import constant
-from avow.language.sorts import BoolSort, EnumSort, IntegerSort, NaturalSort, RealSort, SequenceSort, Sort
+from avow.language.sorts import BoolSort, DataSort, EnumSort, IntegerSort, NaturalSort, RealSort, SequenceSort, Sort
 from avow.language.subterms import subterms
 from avow.language.terms import Term
 
@@ -236,3 +236,14 @@ def next_single(value: float, towards: float) -> float:
     away = (towards > 0) == (value > 0)
     (found,) = struct.unpack("f", struct.pack("i", bits + (1 if away else -1)))
     return float(found)
+
+
+def words_of(sort: Sort) -> tuple[str, ...]:
+    """The names of a sort's elements or constructors; numbers and other sorts have none."""
+    match sort:
+        case DataSort(constructors=constructors):
+            return tuple(constructor.name for constructor in constructors)
+        case EnumSort(members=members):
+            return members
+        case _:  # numbers are drawn separately
+            return ()

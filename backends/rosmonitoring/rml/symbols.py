@@ -255,6 +255,8 @@ def carried(rule: Rule, rules: dict[str, Rule], prefix: str) -> Symbol:
     if isinstance(rule, Constant):
         return constant(rule.value, rule.variable.sort)
     source = rules.get(rule.source) if isinstance(rule, Previous) else rule
+    if getattr(source, "frame", ""):
+        raise NotRml(f"{rule.variable.qualified} is in the frame of a topic, and RML transforms nothing")
     name = rule.variable.qualified
     sort = rule.variable.sort
     if isinstance(sort, s.FunctionSort):
