@@ -163,6 +163,7 @@ class ObligationView:
     obligation: Obligation
     criticality: str
     status: Status
+    """By its own evidence alone; no format counts it."""
     standing: Status
     """The status with all claims below it: `unsupported` if its own evidence is good but one of them fails."""
     evidence: tuple[EvidenceView, ...]
@@ -185,9 +186,16 @@ class ObligationView:
         return self.obligation.id
 
     @property
-    def word(self) -> str:
+    def word(self) -> Level | Status:
         """How it stands, in the term that every format uses."""
-        return self.level or self.standing.value
+        return self.level or self.standing
+
+    @property
+    def passes(self) -> bool:
+        """Whether it is shown: not by a person's reason in place of evidence, and a requirement's claim only if the
+        requirement is."""
+        holds, own = (self.level.holds, self.status) if self.level else (self.standing.supports, self.standing)
+        return holds and own is not Status.JUSTIFIED
 
     @property
     def advice(self) -> bool:

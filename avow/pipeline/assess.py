@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import json
 import os
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
@@ -52,6 +51,7 @@ from avow.pipeline.workload import LISTED, Survey, write_obligations
 from avow.report import render_all, write_index
 from avow.report.page import fill
 from avow.report.short import terminal_lines
+from avow.report.wording import tally
 from avow.system.folding import seen
 from avow.system.graph import dataflow
 from avow.system.graph_svg import sheet
@@ -299,11 +299,11 @@ def _summarise(state: State, surveyed: Survey, case: Case) -> Result:
         if item.kind == Status.ERROR.value
     ]
     index = state.workspace.relative(state.workspace.report(surveyed.system.name) / "index.html")
-    counts = Counter(view.status.value for view in case.obligations if not view.obligation.advisory)
+    counts = tally(view for view in case.obligations if not view.advice)
     return Result(
         case.system,
         case.exit_code,
-        dict(counts),
+        {word.value: number for word, number in counts.items()},
         index,
         tuple(gates),
         verdict=case.answers.told,

@@ -35,14 +35,7 @@ def _result_of(case: Case) -> str:
 
 def _fails(view: ObligationView) -> bool:
     """Whether a claim is refuted, and the plan says nothing of it."""
-    return tone(view.status) == "bad" and not view.handled
-
-
-def _passes(case: Case, view: ObligationView) -> bool:
-    """Whether a claim passes: not if a person's reason replaces evidence, and a requirement's claim only if the
-    requirement itself is shown."""
-    holds = all(r.level.holds for r in case.requirements if view.id in r.obligations)
-    return view.standing.supports and view.status is not Status.JUSTIFIED and holds
+    return tone(view.standing) == "bad" and not view.handled
 
 
 # -- JUnit XML ------------------------------------------------------------------------------------------------------
@@ -66,7 +59,7 @@ def render_junit(case: Case) -> str:
     suites = [("gates", list(map(_of_gate, case.gates)))]
     if case.requirements:
         suites.append(("requirements", [_of_requirement(r, case) for r in case.requirements]))
-    suites += [(node, [_of_claim(v, case) for v in views]) for node, views in of_nodes(case.obligations).items()]
+    suites += [(node, list(map(_of_claim, views))) for node, views in of_nodes(case.obligations).items()]
     return fill("junit.xml.j2", case=case, suites=suites, result=_result_of(case))
 
 
@@ -85,14 +78,14 @@ def _of_requirement(requirement: RequirementView, case: Case) -> _Row:
     return _Row("requirements", requirement.id, "" if requirement.level.holds else "skipped", message)
 
 
-def _of_claim(view: ObligationView, case: Case) -> _Row:
+def _of_claim(view: ObligationView) -> _Row:
     o, message = view.obligation, f"{view.word}: {decisive(view)}"
     row = _Row(f"{o.node}.{o.kind}", o.name, "", seconds=sum(r.seconds for r in view.records))
     if _fails(view) and not view.advice:
-        return replace(row, outcome="failure", message=message, type=view.status.value)
-    if view.status is Status.ERROR:
+        return replace(row, outcome="failure", message=message, type=view.standing.value)
+    if view.standing is Status.ERROR:
         return replace(row, outcome="error", message=message, type="error")
-    if not _passes(case, view):
+    if not view.passes:
         return replace(row, outcome="skipped", message=f"{view.handled}; {message}" if view.handled else message)
     return row
 
@@ -153,7 +146,7 @@ def _rule_text(view: ObligationView) -> str:
 
 def _result(view: ObligationView, case: Case, rules: list[str]) -> dict[str, Any]:
     o = view.obligation
-    kind, level = _sarif_level(view, case)
+    kind, level = _sarif_level(view)
     result: dict[str, Any] = {
         "ruleId": _rule(view),
         "ruleIndex": rules.index(_rule(view)),
@@ -179,14 +172,14 @@ def _result(view: ObligationView, case: Case, rules: list[str]) -> dict[str, Any
     return result
 
 
-def _sarif_level(view: ObligationView, case: Case) -> tuple[str, str]:
+def _sarif_level(view: ObligationView) -> tuple[str, str]:
     if view.standing.supports:
-        return ("pass" if _passes(case, view) else "open"), "none"
+        return ("pass" if view.passes else "open"), "none"
     if view.advice:
         return "informational", "none"
-    if tone(view.status) == "bad":
+    if tone(view.standing) == "bad":
         return "fail", "error"
-    if view.status in (Status.VACUOUS, Status.ERROR) or view.standing is Status.UNSUPPORTED:
+    if view.standing in (Status.VACUOUS, Status.ERROR, Status.UNSUPPORTED):
         return "fail", "warning"
     return "open", "none"
 
@@ -199,7 +192,7 @@ def render_attestation(case: Case) -> str:
     every = [_statement(case, "", list(case.obligations), _result_of(case))]
     for node, own in of_nodes(case.obligations).items():
         views = [view for view in own if not view.advice]
-        good = all(_passes(case, view) for view in views)
+        good = all(view.passes for view in views)
         bad = any(map(_fails, views))
         every.append(
             _statement(case, node, views, "FAILED" if bad else "PASSED" if good and not case.earlier else "WARNED")
@@ -216,7 +209,7 @@ def _statement(case: Case, node: str, views: list[ObligationView], result: str) 
     groups: dict[str, list[str]] = {"passedTests": [], "warnedTests": [], "failedTests": []}
     for view in views:
         bad = _fails(view) and not view.advice
-        groups["passedTests" if _passes(case, view) else "failedTests" if bad else "warnedTests"].append(view.id)
+        groups["passedTests" if view.passes else "failedTests" if bad else "warnedTests"].append(view.id)
     return {
         "_type": "https://in-toto.io/Statement/v1",
         "subject": [{"name": name, "digest": {"sha256": mark}} for name, mark in sorted(subjects.items())],

@@ -14,6 +14,7 @@ from avow.assurance.naming import derivation_claim
 from avow.base.plain import count, listed
 from avow.base.records import dataclass
 from avow.evidence.obligation import Kind
+from avow.report.wording import tally
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +52,7 @@ def requirement_modules(case: Case) -> tuple[RequirementModule, ...]:
                 of = f"{len(own)} of {count(total[node.name], 'guarantee')}"
                 away.append((node.name, node.title, f"{of}: {_standings(own)}"))
         side = [v for v in under if v.obligation.kind is Kind.COMPOSITION]
-        stand = ", ".join(f"{many} {said}" for said, many in Counter(v.standing for v in side).items())
+        stand = ", ".join(f"{many} {said}" for said, many in tally(side).items())
         conditions = f"{count(len(side), 'condition')}: {stand}" if side else ""
         supposes = tuple(numbers[key] for key in r.supposes if key in numbers)
         failing = r.failing or r.below
@@ -71,7 +72,7 @@ def node_modules(case: Case) -> tuple[NodeModule, ...]:
 def _standings(views: Sequence[ObligationView]) -> str:
     if len(views) <= 3:
         return ", ".join(f"{view.obligation.name} {view.standing}" for view in views)
-    return ", ".join(f"{many} {said}" for said, many in Counter(view.standing for view in views).items())
+    return ", ".join(f"{many} {said}" for said, many in tally(views).items())
 
 
 def conditions(case: Case) -> list[tuple[ObligationView, list[str]]]:

@@ -325,8 +325,7 @@ def _counts(views: Sequence[ObligationView]) -> list[tuple[str, _Stands, int]]:
 
 def _stands(views: Iterable[ObligationView]) -> _Stands:
     """How the claims stand, best first, in the word and colour that each one's own line has."""
-    found = Counter((tuple(Status).index(v.standing), v.word, wording.tone(v.standing)) for v in views)
-    return [(word, tone, number) for (_, word, tone), number in sorted(found.items())]
+    return [(word, wording.tone(word), number) for word, number in wording.tally(views).items()]
 
 
 def _used_methods(case: Case) -> list[str]:

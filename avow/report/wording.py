@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import re
 import shlex
+from collections import Counter
 from collections.abc import Iterable, Mapping
 from typing import Any
 from urllib.parse import quote
@@ -61,9 +62,23 @@ MEANINGS = {status: meaning for status, (_, _, meaning) in _SHOWN.items()}
 _DIGEST = re.compile(r"[0-9a-f]{64}\Z")
 
 
-def tone(status: Status) -> str:
+def tone(word: Status | Level) -> str:
     """``good``, ``fair``, ``open`` or ``bad``: the four colours."""
-    return _SHOWN[status][1]
+    match word:
+        case Status():
+            return _SHOWN[word][1]
+        case Level.SHOWN:
+            return "good"
+        case Level.REFUTED:
+            return "bad"
+        case _:  # every other level
+            return "fair" if word.holds else "open"
+
+
+def tally(views: Iterable[ObligationView]) -> dict[Status | Level, int]:
+    """How many claims stand how, best first, each in the word of its own line: every format counts like this."""
+    order = (*Status, *Level)
+    return dict(sorted(Counter(view.word for view in views).items(), key=lambda found: order.index(found[0])))
 
 
 def anchor(claim: str) -> str:

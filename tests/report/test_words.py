@@ -6,6 +6,7 @@ import csv
 import io
 import json
 import re
+from collections import Counter
 from dataclasses import replace
 from xml.etree import ElementTree
 
@@ -18,12 +19,12 @@ from reqif.parser import ReqIFParser
 
 from avow.assurance.model import Gate
 from avow.assurance.naming import short
-from avow.base.verdict import Object, Verdict
+from avow.base.verdict import Hypothesis, HypothesisKind, Object, Verdict
 from avow.evidence.obligation import Kind
 from avow.evidence.status import Status
 from avow.report.markdown import render_markdown
 from avow.report.page import render_page
-from avow.report.wording import bound_text, gate_line, tone, tool_command
+from avow.report.wording import bound_text, gate_line, tally, tone, tool_command
 from avow.sanity.claims import Property
 from avow.system.plan import Hazard, Requirement, Validation
 from report.test_reqif import values as reqif_values
@@ -94,18 +95,23 @@ def test_a_claim_has_one_status_in_every_format(verdict: str) -> None:
         Requirement("Q", "It is so.", "agent.x > 0", None, ("agent.g2",), validation=unread),
     ]
     own = obligation("system", Kind.REQUIREMENT, "Q", clauses=("agent.g2",))
-    records = [record, evidence(second, of=Object.SOURCE), evidence(own, method="compose")]
+    reason, given_it = (obligation("system", Kind.COMPOSITION, name) for name in ("start", "whole.loop"))
+    on_reason, on_both = (
+        {"rests_on": (Hypothesis(HypothesisKind.CLAIM, o.local_id, o.digest),)} for o in (reason, given_it)
+    )
+    records = [record, evidence(second, of=Object.SOURCE), evidence(own, method="compose", **on_both)]
+    records += [evidence(reason, Verdict.JUSTIFIED, "review"), evidence(given_it, method="compose", **on_reason)]
     plans = [node_plan("agent", "low", "hoare", "review")]
     hazards = [Hazard("H1", "It burns", "critical", mitigated_by=("R",)), Hazard("H2", "It drifts", "marginal")]
     subject = system({"agent": ["g1", "g2"]}, plans=plans, requirements=asked, hazards=hazards)
-    found = make_case(subject, [first, second, own], records)
+    found = make_case(subject, [first, second, own, reason, given_it], records)
     made = {name: text for name, text in every_text(found) if isinstance(text, str)}
     levels = {r.id: r.level.value for r in found.requirements}
     claims = {view.id: view.standing.value for view in found.obligations} | {own.id: levels["Q"]}
     dangers = {view.hazard.id: view.level.value for view in found.hazards}
-    passing = {v.id for v in found.obligations if v.standing.supports and v.status is not Status.JUSTIFIED} - (
-        set() if found.requirements[1].level.holds else {own.id}
-    )
+    passing = {v.id for v in found.obligations if v.standing.supports and v.standing is not Status.JUSTIFIED} - {own.id}
+    passing |= {own.id} if found.requirements[1].level.holds else set()
+    assert {reason.id, given_it.id}.isdisjoint(passing)
 
     data = json.loads(made["report.json"])
     assert {o["obligation"]["name"]: o.get("level", o["standing"]) for o in data["obligations"]} == {
@@ -121,6 +127,11 @@ def test_a_claim_has_one_status_in_every_format(verdict: str) -> None:
         assert {told["ReqIF.ForeignID"]: told["Status"] for of, told in objects if of == kind} == wanted
     reasons = {r["tool"] for r in rows if r["verdict"] == "justified"}
     assert reasons <= {"a person"}, "a person's reason is no tool's"
+    table = made["claims.html"].partition('<table class="counts">')[2].partition("</table>")[0]
+    told = Counter[str]()
+    for many, word in re.findall(r">(\d+) ([a-z -]+)</span>", table):
+        told[word] += int(many)
+    assert told == Counter(claims.values()) == Counter({w.value: n for w, n in tally(found.obligations).items()})
     results = json.loads(made["report.sarif"])["runs"][0]["results"]
     assert all(f" is {claims[r['properties']['obligation']]}. " in r["message"]["text"] for r in results)
     assert {r["properties"]["obligation"] for r in results if r["kind"] == "pass"} == passing
