@@ -191,8 +191,13 @@ def test_faults_of_layout_are_found(tmp_path: Path) -> None:
     asked = {key: (pages.get(key, text).replace("</style>", css + "</style>"), 420) for key, (css, _) in FAULTS.items()}
     failure = Failure("A gate", f"system/composition/{'Agent.' * 12}persistence", "")
     wide = replace(rover_case(), answers=replace(rover_case().answers, failures=(failure,)))
-    measured = measure({**asked, "wide": (render_answers(wide), 320)}, tmp_path)
+    large = large_case()
+    longest = tuple(replace(r, level=Level.TESTED_MODELS) for r in large.requirements)
+    told = replace(large.answers, by_level=((Level.TESTED_MODELS, len(longest)),))
+    levels = render_answers(replace(large, requirements=longest, answers=told))
+    measured = measure({**asked, "wide": (render_answers(wide), 320), "levels": (levels, 1024)}, tmp_path)
     assert measured["wide"]["closed"] == [], "a long name is broken"
+    assert measured["levels"]["closed"] == [], "a level overprints the names beside it"
     assert [fault for fault in FAULTS if not measured[fault][FAULTS[fault][1]]] == []
 
 
