@@ -12,6 +12,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import field
 from enum import StrEnum
 
+from avow.assurance.naming import short
 from avow.base.codec import LATER
 from avow.base.plain import count
 from avow.base.records import dataclass
@@ -213,9 +214,16 @@ class WeakestEvidence:
     """The guarantee in English."""
     words: str
     """What was observed, with its bound, as a sentence without its full stop."""
+    bound: str = field(default="", metadata=LATER)
+    """For a sample, ``bound 13 %``: its bound on failures, at the confidence that `words` has; or ``no bound``."""
     needed_by: tuple[str, ...] = ()
     beside: int = field(default=0, metadata=LATER)
     """The number of requirements whose weakest evidence is in another guarantee of the same node."""
+
+    @property
+    def brief(self) -> str:
+        """``navigation.stays, tested, bound 13 %``."""
+        return ", ".join(part for part in (short(self.claim), self.status, self.bound) if part)
 
     @property
     def others(self) -> str:

@@ -45,7 +45,7 @@ from avow.assurance.deficits import deficits
 from avow.assurance.facts import Facts, facts_of_case
 from avow.assurance.findings import handle
 from avow.assurance.first_screen import answers, weakest_of, with_signature
-from avow.assurance.gap import independent, missing_tools
+from avow.assurance.gap import counted, independent, missing_tools
 from avow.assurance.gates import exit_code, gates, grants, suggestion_for
 from avow.assurance.mitigated import hazard_views
 from avow.assurance.model import (
@@ -132,7 +132,8 @@ def conclude(facts: Facts) -> Case:
     relied = {v.id: r for v in views if (r := relied_upon(v, said.judge, programs))}
     closure = Closure(views, facts.nodes, rests, standings, relied)
     closed = {r.id: closure.of_requirement(r.id) for r in facts.requirements}
-    whole = closure.of([v.id for v in views if v.obligation.kind in (Kind.GUARANTEE, Kind.PROGRAM)])
+    leaves = [v.id for v in views if v.obligation.kind in (Kind.GUARANTEE, Kind.PROGRAM)]
+    whole = closure.of([*leaves, *(v.id for v in views if v.status is Status.JUSTIFIED)])
     supposed = assumptions(facts, views, relied, closed, whole, said)
     by_id, titles = {view.id: view for view in views}, {node.name: node.title for node in facts.nodes}
     requirements = tuple(
@@ -158,7 +159,7 @@ def conclude(facts: Facts) -> Case:
         *(OpenItem("program", name, text, advice=True) for name, (_, text) in by_program.items()),
         *remarks(facts.sources, views),
     )
-    single = _single(views)
+    single = _single(views, facts)
     weakened = deficits(views, requirements, supposed, listed, findings, relied, single, hazards, missing_tools(facts))
     basis = {n for c in closed.values() for n in c.claims} if closed else set(whole.claims)
     basis |= {n for h in hazards for n in h.closure}
@@ -181,7 +182,7 @@ def conclude(facts: Facts) -> Case:
         found,
         weakest,
         following,
-        trust_lines(proofs, facts.kernel, supposed, views, facts.run.id),
+        trust_lines(proofs, facts.kernel, supposed, views, facts.run.id, len(single)),
         strict=facts.expected is not None,
         passed=code == 0,
     )
@@ -394,14 +395,15 @@ def _derivation(
     )
 
 
-def _single(views: Sequence[ObligationView]) -> tuple[str, ...]:
-    return tuple(
-        view.id
-        for view in views
-        if view.obligation.kind is Kind.GUARANTEE
-        and view.status.supports
-        and independent(r for r in view.records if weigh(r).support) == 1
-    )
+def _single(views: Sequence[ObligationView], facts: Facts) -> tuple[str, ...]:
+    """The guarantees without a second independent method, as the policy counts methods: a test of too few cases is
+    none."""
+
+    def methods(view: ObligationView) -> int:
+        kept, _ = counted(view, facts.policy.demand(view.criticality), facts.policy, facts.today)
+        return independent(record for record in kept if weigh(record).support)
+
+    return tuple(v.id for v in views if v.obligation.kind is Kind.GUARANTEE and v.status.supports and methods(v) < 2)
 
 
 def _grade(facts: Facts, proofs: Sequence[ProofView]) -> tuple[Grade, str]:

@@ -34,6 +34,7 @@ from avow.assurance.relied import (
     OBJECTS,
     Relied,
     agrees,
+    bound_of,
     examined,
     looked_at,
     seen,
@@ -88,6 +89,7 @@ def weakest_of(
         relied[name].status.value,
         o.claim.rstrip("."),
         seen(relied[name]),
+        bound_of(relied[name]),
     )
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import field
 
-from avow.assurance.answers import Level, Tone
+from avow.assurance.answers import Level, Tone, WeakestEvidence
 from avow.base.codec import LATER
 from avow.base.records import dataclass
 from avow.system.plan import Hazard
@@ -36,12 +36,15 @@ class HazardView:
     tone: Tone
     closure: tuple[str, ...] = field(default=(), metadata=LATER)
     """Every obligation that its mitigations rest on."""
-    least: str = field(default="", metadata=LATER)
-    """Of several mitigations of its level, the one on the weakest evidence."""
+    weakest_evidence: WeakestEvidence | None = field(default=None, metadata=LATER)
+    """The weakest of everything beneath it; of a hazard that is not mitigated, the claim that fails."""
 
     @property
-    def weakest(self) -> Mitigation | None:
-        return min(self.mitigations, key=lambda m: (WORST_FIRST.index(m.level), m.name != self.least), default=None)
+    def weakest(self) -> str:
+        """The weakest evidence in a phrase; a mitigation's name if it holds by no claim, or fails by none."""
+        if self.weakest_evidence:
+            return self.weakest_evidence.brief
+        return min(self.mitigations, key=lambda m: WORST_FIRST.index(m.level)).name if self.mitigations else ""
 
     @property
     def meaning(self) -> str:
@@ -53,5 +56,4 @@ class HazardView:
     @property
     def stands(self) -> str:
         """Its level, in a phrase."""
-        weakest = self.weakest
-        return f"{self.level} (weakest: {weakest.name})" if weakest else "no mitigation"
+        return f"{self.level} (weakest: {self.weakest})" if self.mitigations else "no mitigation"

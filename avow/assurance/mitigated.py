@@ -8,16 +8,14 @@ from dataclasses import replace
 from avow.assurance.answers import Assumption, Level, Tone
 from avow.assurance.closure import Closure
 from avow.assurance.first_screen import tone_of, weakest_of
-from avow.assurance.hazards import WORST_FIRST, HazardView, Mitigation
+from avow.assurance.hazards import HazardView, Mitigation
 from avow.assurance.model import NodeView, ObligationView, RequirementView
 from avow.assurance.naming import requirement_claim
 from avow.assurance.relied import Opinion, Relied, relied_upon, weakness
-from avow.assurance.requirement_views import is_bounded, level_of
+from avow.assurance.requirement_views import failing_of, is_bounded, level_of
 from avow.evidence.obligation import Kind
 from avow.evidence.status import Status
 from avow.system.plan import Hazard
-
-_Weakness = tuple[int, float, int]
 
 
 def hazard_views(
@@ -37,15 +35,15 @@ def hazard_views(
     clauses = {f"{node.name}.{clause}" for node in nodes for clause, _ in node.guarantees}
     fed = {f"{node.name}.{port}": source for node in nodes for port, source in node.inputs}
 
-    def mitigation(name: str) -> tuple[Mitigation, Tone, _Weakness]:
+    def mitigation(name: str) -> tuple[Mitigation, Tone, Mapping[str, Relied]]:
         if name in known:
             r = known[name]
-            return Mitigation(name, r.words, r.level, r.obligations), r.tone, worst(r.closure, relied)
+            return Mitigation(name, r.words, r.level, r.obligations), r.tone, {}
         if name in fed and name not in clauses:
             source = fed[name]
             who = f"only {titles.get(source, source)}" if source else "the environment"
             level, tone = (Level.ARGUED, Tone.AMBER) if source else (Level.NOT_SHOWN, Tone.RED)
-            return Mitigation(name, f"in the graph {who} reaches {name}", level, ()), tone, worst((), relied)
+            return Mitigation(name, f"in the graph {who} reaches {name}", level, ()), tone, {}
         node, slash, method = name.partition("/")
         owner, _, clause = (node if slash else name).partition(".")
         own = [
@@ -57,27 +55,24 @@ def hazard_views(
             and (not slash or method in {planned for planned, _ in view.planned})
         ]
         by = {v.id: one for v in own if (one := _of_method(v, method, opinion))} if slash else relied
-        level, tone, weak = judged([view.id for view in own], by)
+        claims = tuple(view.id for view in own)
+        level, tone = judged(claims, by)
         title = titles.get(owner, owner)
         words = own[0].obligation.claim if clause and own else f"{title}: {method}" if slash else title
-        return Mitigation(name, words, level, tuple(view.id for view in own)), tone, weak
+        return Mitigation(name, words, level, claims), tone, {claim: by[claim] for claim in claims if claim in by}
 
-    def worst(claims: Iterable[str], by: Mapping[str, Relied]) -> _Weakness:
-        found = weakest_of(claims, views, by, titles)
-        return weakness(by[found.claim]) if found else (0, 0.0, 0)
-
-    def judged(own: Sequence[str], by: Mapping[str, Relied]) -> tuple[Level, Tone, _Weakness]:
+    def judged(own: Sequence[str], by: Mapping[str, Relied]) -> tuple[Level, Tone]:
         """How far guarantees are shown by their records `by`, and by the records of everything that they rest on."""
         closed = closure.of(own)
         mine = [s for s in supposed if not set(closed.claims).isdisjoint(s.where)]
         taken = {name: one for name, one in {**relied, **by}.items() if name not in own or name in by}
         if any(views[name].standing in (Status.REFUTED, Status.CONTRADICTORY) for name in own):
-            return Level.REFUTED, Tone.RED, worst((), taken)
+            return Level.REFUTED, Tone.RED
         if not own or closed.failing or any(name not in taken for name in own) or any(s.expired for s in mine):
-            return Level.NOT_SHOWN, Tone.RED, worst((), taken)
+            return Level.NOT_SHOWN, Tone.RED
         level = level_of(closed.claims, views, taken)
         bounded = is_bounded(closed.claims, taken) or any(taken[name] != relied[name] for name in own)
-        return level, tone_of(level, mine, bounded=bounded), worst(closed.claims, taken)
+        return level, tone_of(level, mine, bounded=bounded)
 
     found = []
     for hazard in hazards:
@@ -86,8 +81,14 @@ def hazard_views(
         tone = min((tone for _, tone, _ in items), key=lambda t: t.rank, default=Tone.RED)
         own = (name for m, _, _ in items for name in ((requirement_claim(m.name),) if m.name in known else m.claims))
         below = closure.of(own)
-        least = min(((WORST_FIRST.index(m.level), weak, m.name) for m, _, weak in items), default=("",))[-1]
-        found.append(HazardView(hazard, tuple(m for m, _, _ in items), level, tone, below.claims, least))
+        taken: dict[str, Relied] = {}  # of a claim that several methods are named for, the weaker record
+        for name, one in (pair for _, _, by in items for pair in by.items()):
+            taken[name] = min(one, taken.get(name, one), key=weakness)
+        weakest = weakest_of(below.claims, views, {**relied, **taken}, titles)
+        if not level.holds:
+            claims = [claim for m, _, _ in items for claim in m.claims]
+            weakest = failing_of(claims, below.failing, views, titles)
+        found.append(HazardView(hazard, tuple(m for m, _, _ in items), level, tone, below.claims, weakest))
     return tuple(found)
 
 

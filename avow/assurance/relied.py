@@ -25,7 +25,8 @@ if TYPE_CHECKING:
 
 LETTERS = {"proved": "P", "checked": "C", "tested": "T", "monitored": "M", "reviewed": "R", "justified": "J"}
 EXHAUSTIVE = frozenset({Status.PROVED, Status.CHECKED})
-EVIDENCE = frozenset({*EXHAUSTIVE, Status.TESTED, Status.MONITORED, Status.REVIEWED})
+SAMPLED = frozenset({Status.TESTED, Status.MONITORED})
+EVIDENCE = frozenset({*EXHAUSTIVE, *SAMPLED, Status.REVIEWED})
 """The findings of tools and readers; a reason in the plan is not among them."""
 
 
@@ -186,8 +187,15 @@ def weakness(relied: Relied) -> tuple[int, float, int]:
     bound, many = upper_bound(relied.record), judgements(relied.record)
     if bound is None:
         bound = 1 - 0.05 ** (1 / many) if many else 1.0
-    sampled = relied.status in (Status.TESTED, Status.MONITORED)
+    sampled = relied.status in SAMPLED
     return Status.MONITORED.rank if sampled else relied.status.rank, -bound, relied.status.rank
+
+
+def bound_of(relied: Relied) -> str:
+    """The number by which samples are ordered, as in ``bound 13 %``; empty if it is no sample."""
+    bound = upper_bound(relied.record)
+    told = "no bound" if bound is None else f"bound {_rounded(bound, ROUND_CEILING)}"
+    return told if relied.status in SAMPLED else ""
 
 
 def seen(relied: Relied) -> str:

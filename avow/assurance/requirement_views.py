@@ -81,7 +81,7 @@ def held(
         tone=Tone.AMBER if awaits else tone_of(level, mine, bounded=bounded),
         closure=closed.claims,
         failing=closed.failing,
-        weakest_evidence=(_failing_of(view, closed, views, titles) if fails else None) or weakest,
+        weakest_evidence=(failing_of(view.obligations, closed.failing, views, titles) if fails else None) or weakest,
         supposes=tuple(s.key for s in mine),
         rate=rate,
         searched=next((seen(r) for n in view.obligations if (r := relied.get(n)) and r.status is Status.TESTED), ""),
@@ -96,7 +96,7 @@ def _with_level(
         return view.answer
     parts = [f"{level.capitalize()}.", "Nobody has validated its sentence." if awaits else ""]
     parts += [
-        f"The weakest evidence below it: {short(weakest.claim)}, {weakest.status}." if weakest else "",
+        f"The weakest evidence below it: {weakest.brief}." if weakest else "",
         view.answer,
     ]
     parts.append(f"F{rate.words[1:]}." if rate else "")
@@ -123,13 +123,13 @@ def level_of(claims: Iterable[str], views: Mapping[str, ObligationView], relied:
     return Level.MODELS if Object.MODEL in objects else Level.SHOWN
 
 
-def _failing_of(
-    view: RequirementView, closed: Closed, views: Mapping[str, ObligationView], titles: Mapping[str, str]
+def failing_of(
+    own: Iterable[str], failing: Iterable[str], views: Mapping[str, ObligationView], titles: Mapping[str, str]
 ) -> WeakestEvidence | None:
-    """The failing claim below an open requirement, in place of the weakest evidence: what refutes the requirement
-    itself; else of several a guarantee first, then the worst."""
-    statuses = {name: views[name].status for name in closed.failing if name in views}
-    own = [name for name in view.obligations if statuses.get(name) in (Status.REFUTED, Status.CONTRADICTORY)]
+    """The failing claim below an open requirement or hazard, in place of the weakest evidence: what refutes one of its
+    `own` claims; else of several a guarantee first, then the worst."""
+    statuses = {name: views[name].status for name in failing if name in views}
+    own = [name for name in own if statuses.get(name) in (Status.REFUTED, Status.CONTRADICTORY)]
     own = own or [name for name in statuses if views[name].obligation.kind is Kind.GUARANTEE]
     for name in worst_first(own or statuses, statuses)[:1]:
         o, status = views[name].obligation, statuses[name].value

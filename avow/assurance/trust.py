@@ -10,6 +10,7 @@ from avow.assurance.answers import Assumption, TrustLine
 from avow.assurance.certification import CALCULUS, KernelRun, ProofGrade, ProofView, certifiable
 from avow.assurance.model import ObligationView
 from avow.base.plain import count, listed
+from avow.evidence.obligation import Kind
 from avow.evidence.record import Evidence
 from avow.evidence.status import Status, weigh
 
@@ -22,8 +23,10 @@ def trust_lines(
     assumptions: Sequence[Assumption],
     views: Sequence[ObligationView],
     run: str,
+    single: int,
 ) -> tuple[TrustLine, ...]:
-    """The kernel, the solvers, the front end, tools whose answers are trusted, and assumptions without an owner."""
+    """The kernel, the solvers, the front end, tools whose answers are trusted, and assumptions without an owner.
+    `single`: how many guarantees one method alone shows."""
     wanted = certifiable(proofs)
     certified = [p for p in wanted if p.grade in (ProofGrade.CERTIFIED_1, ProofGrade.CERTIFIED_2)]
     twice = sum(p.grade is ProofGrade.CERTIFIED_2 for p in certified)
@@ -51,9 +54,10 @@ def trust_lines(
     if tools:
         (tool, many), *others = sorted(tools.items())
         names = listed([f"{tool}: {count(many, 'answer')}", *(f"{tool}: {many}" for tool, many in others)], 5)
-        lines.append(
-            TrustLine("tools whose answers have no certificate", names, "only a second method checks them", True)
-        )
+        shown = sum(v.obligation.kind is Kind.GUARANTEE and v.status.supports for v in views)
+        again = f"no other program checks these answers; {shown - single} of {count(shown, 'guarantee')} that hold"
+        second = f"{again} ha{'s' if shown == 1 else 've'} a second, independent method"
+        lines.append(TrustLine("tools whose answers have no certificate", names, second, True))
     bare = [a for a in assumptions if not a.owned]
     if bare:
         numbers = listed([a.number for a in bare], 6)

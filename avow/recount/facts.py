@@ -12,8 +12,11 @@ from typing import Any
 
 Json = dict[str, Any]
 HOLDS = ("shown", "shown of models", "shown by tests", "shown by tests and of models", "argued")
-_SUPPORTS = ("proved", "checked", "tested", "monitored", "reviewed", "justified")
+SUPPORTS = ("proved", "checked", "tested", "monitored", "reviewed", "justified")
 """Best first."""
+_SAMPLED = ("tested", "monitored")
+_SEEN = ("proved", "checked", *_SAMPLED, "reviewed")
+"""What tools and readers found, not a person's reason."""
 _STRICT = 1 - 1e-5
 """Bounds in records are decimals of six digits: so far may one lie below what the sample gives."""
 _BELOW = {"catastrophic": ("medium", "low"), "critical": ("medium", "low"), "marginal": ("low",), "negligible": ()}
@@ -64,7 +67,7 @@ class Facts:
 
     def lost(self) -> int:
         """Requirements that lack more than a person who reads the sentence against the formula."""
-        waits = [r for r in self.requirements if r["status"] in (*_SUPPORTS, "argued") and not r.get("expired")]
+        waits = [r for r in self.requirements if r["status"] in (*SUPPORTS, "argued") and not r.get("expired")]
         waiting = [r["id"] for r in waits if not r.get("failing") and not r["unknown_names"]]
         return len([name for name in self.level("not shown") if name not in waiting])
 
@@ -88,7 +91,7 @@ class Facts:
 
     def known(self) -> int:
         """Findings that the plan speaks of and that support nothing."""
-        return sum(bool(v["handled"]) and v["standing"] not in (*_SUPPORTS, "argued") for v in self.views)
+        return sum(bool(v["handled"]) and v["standing"] not in (*SUPPORTS, "argued") for v in self.views)
 
     def signed(self) -> str:
         """The sentence that was signed, while the case is the signed one."""
@@ -122,7 +125,7 @@ class Facts:
         ways = []
         for v in self.guarantees:
             if v["obligation"]["node"] == node:
-                open_ = v["standing"] not in (*_SUPPORTS, "argued")
+                open_ = v["standing"] not in (*SUPPORTS, "argued")
                 ways.append({(v["standing"], "")} if open_ else {_way(r) for r in supporting(v)})
         fits = [{w[0] == status and what in (w[1], "-") for w in way} for way in ways]
         return sum(fit == {True} for fit in fits), sum(True in fit for fit in fits)
@@ -137,8 +140,8 @@ class Facts:
         hand = [{r["link"] != "generated" for r in supporting(v)} for v in within]
         premises = [v for v in self.views if v["obligation"]["kind"] == "composition"]
         exact = {
-            "open": sum(v["standing"] not in (*_SUPPORTS, "argued") for v in within),
-            "premises": sum(v["standing"] not in (*_SUPPORTS, "argued") for v in premises),
+            "open": sum(v["standing"] not in (*SUPPORTS, "argued") for v in within),
+            "premises": sum(v["standing"] not in (*SUPPORTS, "argued") for v in premises),
             "argued": len(self.level("argued")),
             "unvalidated": sum(not r.get("validated") for r in self.requirements),
             "bounded": sum(bool(r.get("bounded")) and r["level"] in HOLDS for r in self.requirements),
@@ -187,6 +190,22 @@ class Facts:
         own = {name for r in self.requirements if r["id"] == requirement for name in r["obligations"]}
         return {words for v in self.views if _id(v) in own for r in supporting(v) for words in _seen(r)}
 
+    def fails(self, claims: list[str]) -> list[str]:
+        """Those of the claims that do not hold, each with its status, as the page names them."""
+        bad = [v for v in self.views if _id(v) in claims and v["standing"] not in (*SUPPORTS, "argued")]
+        return [f"{_short(v)}, {v['status']}" for v in bad]
+
+    def weakest(self, claims: list[str]) -> list[str]:
+        """``navigation.stays, tested, bound 13 %``: what may be the weakest evidence of some claims. Where a claim has
+        several records, either may be the one relied upon: none that is certainly stronger than another claim's."""
+        known, leaves = set(claims), ("guarantee", "requirement")
+        of = [v for v in self.views if _id(v) in known and v["obligation"]["kind"] in leaves]
+        own = [v for v in of if v["obligation"]["kind"] == "guarantee"]
+        ways = [(v, sorted((_weakness(r), _told(r)) for r in supporting(v) if support(r) in _SEEN)) for v in own or of]
+        ways = [(v, found) for v, found in ways if found]
+        least = min((found[-1][0] for _, found in ways), default=(0, 0.0))
+        return [f"{_short(v)}, {told}" for v, found in ways for weak, told in found if weak <= least]
+
     def rate(self, words: str) -> str:
         """The least favourable rate of the requirements, as the page has it, from the samples of its leaves."""
         found = [rate for r in self.requirements if (rate := r.get("rate")) and rate["bound"]]
@@ -214,7 +233,7 @@ def records(view: Json) -> list[Json]:
 
 def supporting(view: Json) -> list[Json]:
     """The records that may be relied upon: none where something refutes the claim."""
-    return [record for record in records(view) if support(record) and view["status"] in _SUPPORTS]
+    return [record for record in records(view) if support(record) and view["status"] in SUPPORTS]
 
 
 def _refuting(record: Json, formula: str) -> str:
@@ -230,9 +249,9 @@ def _refuting(record: Json, formula: str) -> str:
 def support(record: Json) -> str:
     """What a record supports with: no more than its method can show, and nothing where it is vacuous."""
     told, most = record["verdict"], record["strength"]
-    if record["vacuous"] or told not in _SUPPORTS or most not in _SUPPORTS:
+    if record["vacuous"] or told not in SUPPORTS or most not in SUPPORTS:
         return ""
-    return _SUPPORTS[max(_SUPPORTS.index(told), _SUPPORTS.index(most))]
+    return SUPPORTS[max(SUPPORTS.index(told), SUPPORTS.index(most))]
 
 
 def _way(record: Json) -> tuple[str, str]:
@@ -257,20 +276,56 @@ def _sampled(stratum: Json) -> bool:
     return float(Fraction(stratum["bound"])) >= _STRICT * upper(stratum["failures"], stratum["trials"], sure)
 
 
+def _short(view: Json) -> str:
+    """A claim as the page names it, if that is no sentence."""
+    o = view["obligation"]
+    return f"{o['node']}.{o['name']}" if o["kind"] == "guarantee" else f"{o['node']}/{o['kind']}/{o['name']}"
+
+
+def _weakness(record: Json) -> tuple[int, float]:
+    """The weakest first: a person's reading; of samples, the greatest bound on failures, or what as many trials would
+    give; then bounded checks; then proofs."""
+    said, bound = support(record), _upper(record)
+    if bound is None:
+        trials = _trials(record)
+        bound = 1 - 0.05 ** (1 / trials) if trials else 1.0
+    return ("reviewed", "sampled", "checked", "proved").index("sampled" if said in _SAMPLED else said), -bound
+
+
+def _told(record: Json) -> str:
+    """``tested, bound 13 %``."""
+    bound = _upper(record)
+    shown = "no bound" if bound is None else f"bound {_percent(Fraction(str(bound)), ROUND_CEILING, 2)}"
+    return f"{support(record)}, {shown}" if support(record) in _SAMPLED else support(record)
+
+
+def _upper(record: Json) -> float | None:
+    """The greatest bound on failures that a record names."""
+    named = ((k.lower().replace("_", " "), v) for k, v in record["bound"].items())
+    return max(
+        (float(v) for k, v in named if "failure" in k and ("below" in k or "at most" in k) and _is(v)), default=None
+    )
+
+
+def _trials(record: Json) -> int:
+    bound = record["bound"]
+    return next((bound[k] for k in ("triggered", "judged", "runs", "cases") if isinstance(bound.get(k), int)), 0)
+
+
 def _silent(view: Json, method: str) -> bool:
     return all(r["verdict"] in ("not-run", "error", "unknown") for r in records(view) if r["method"] == method)
 
 
 def _seen(record: Json) -> Iterator[str]:
     bound = record["bound"]
-    known = [v for k, v in bound.items() if "failure" in k and ("below" in k or "at most" in k) and _is(v)]
+    known = _upper(record)
     runs, cases, hit = bound.get("runs"), bound.get("cases"), bound.get("triggered")
     most = ", with no bound on failures"
-    if known:
+    if known is not None:
         sure, failed = bound.get("confidence"), bound.get("failures", 0)
-        trials = next((bound[k] for k in ("triggered", "judged", "runs", "cases") if isinstance(bound.get(k), int)), 0)
+        trials = _trials(record)
         whole = "worst stratum" in bound or not _is(sure) or not isinstance(failed, int)
-        if not whole and max(known) < _STRICT * upper(failed, trials, sure):
+        if not whole and known < _STRICT * upper(failed, trials, sure):
             return  # it says more than its sample shows
         told = f"{_percent(Fraction(str(sure)), ROUND_FLOOR, 2)} confidence" if _is(sure) else "confidence not recorded"
         drawn = (
@@ -278,7 +333,7 @@ def _seen(record: Json) -> Iterator[str]:
             if "rate" in record["details"]
             else f" of {'runs' if isinstance(runs, int) else 'cases'} drawn like these"
         )
-        most = f" ({told}: at most {_percent(Fraction(str(max(known))), ROUND_CEILING, 2)}{drawn} fail)"
+        most = f" ({told}: at most {_percent(Fraction(str(known)), ROUND_CEILING, 2)}{drawn} fail)"
     if isinstance(runs, int):
         hit = runs if hit is None else hit
         of = _count(runs, "run") if hit == runs else f"{_count(hit, 'triggered run')} of {runs}"

@@ -12,7 +12,7 @@ from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from avow.recount.facts import HOLDS, Facts
+from avow.recount.facts import HOLDS, SUPPORTS, Facts
 from avow.recount.page import CELL, Block
 
 _Numbers = tuple[str | None, ...] | None
@@ -143,14 +143,33 @@ def _named(facts: Facts, match: re.Match[str], _block: Block) -> _Numbers:
 
 
 def _hazard(facts: Facts, match: re.Match[str], _block: Block) -> _Numbers:
-    """A hazard's row: its name beside its text, its mitigations, and one of them that is shown no further than it."""
+    """A hazard's row: its name beside its text, its mitigations, and the weakest evidence beneath them; of one that is
+    not mitigated, a claim that fails, or a mitigation."""
     hazard = next((h for h in facts.hazards if " ".join(h["hazard"]["text"].split()) == match[2]), None)
     if hazard is None:
         return None
+    said = facts.fails(hazard["closure"])
+    if hazard["level"] in HOLDS:
+        said = facts.weakest(hazard["closure"])
     worst = min((_WORST.index(m["level"]) for m in hazard["mitigations"]), default=0)
-    least = [m["name"] for m in hazard["mitigations"] if m["level"] == _WORST[worst]]
-    shown = match[3] if match[3] in least else least[0]
+    said = said or [m["name"] for m in hazard["mitigations"] if m["level"] == _WORST[worst]]
+    shown = match[3] if match[3] in said else "; ".join(said)
     return hazard["hazard"]["id"], match[2], shown, ", ".join(hazard["hazard"]["mitigated_by"])
+
+
+def _bound(facts: Facts, match: re.Match[str], block: Block) -> _Numbers:
+    """The bound of the weakest evidence in a requirement's row."""
+    own = next((r for r in facts.requirements if " ".join(r["id"].split()) == _cells(block.text)[0]), None)
+    found = [told.rpartition(", ")[2] for told in facts.weakest(own["closure"])] if own else []
+    return (match[1] if match[1] in found else "; ".join(found) or "no such requirement",)
+
+
+def _confirmed(facts: Facts, _match: re.Match[str], _block: Block) -> _Numbers:
+    """The guarantees that hold, and those of them that a second method shows: not those of the deficit."""
+    shown = sum(v["status"] in SUPPORTS for v in facts.guarantees)
+    told = next((d["count"] for d in facts.case["deficits"] if d["key"] == "single"), 0)
+    least, most = facts.deficit("single") or (told, told)
+    return str(shown - min(max(told, least), most)), str(shown)
 
 
 def _dangers(facts: Facts, match: re.Match[str], _block: Block) -> _Numbers:
@@ -329,6 +348,7 @@ RULES = (
     ),
     _rule("head", rf"(\d+) ({_LEVELS})(?= [·␟]|, | $)", _level),
     _rule("q1", rf"^ ␟ (\d+) ({_LEVELS}) ␟ (.*?) $", _named),
+    _rule("q1", r", (bound [\d.]+ %)(?= ␟)", _bound),
     _rule("q1", r"^ (␟ .* ␟ )(\d+) $", _row),
     _rule("q1", r"^ Hazards: (.*) $", _dangers),
     _rule("q2", rf"(\d+) ({_STATUS})\b", _basis),
@@ -369,6 +389,7 @@ RULES = (
         r"(?:[(,] ?)([^(),]+): (\d+)(?: answers?)?(?=[,)]| and )",
         lambda f, m, _b: (m[1], str(f.tools()[m[1].strip()])),
     ),
+    _rule("q7", r"(\d+) of (\d+) guarantees? that hold", _confirmed),
     _rule("q7", r"· and (\d+) more\)", _whole(lambda f: len(f.tools()) - 5)),
     _rule("q7", r"without an owner \((.*?)(?: and (\d+) more)?\)", _bare),
     _rule("signature", r"assumptions (A\d+ to A\d+)", lambda f, _m, _b: (f"A1 to A{len(f.assumptions)}",)),

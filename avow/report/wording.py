@@ -322,12 +322,14 @@ def _plain(value: object) -> str:
 
 
 def weakest(requirement: RequirementView) -> str:
-    """The weakest evidence of a requirement: ``tested: navigation``. For a sentence without a formula it is a person's
-    word that the guarantees amount to it."""
+    """The weakest evidence of a requirement: ``tested: navigation, bound 13 %``. For a sentence without a formula it is
+    a person's word that the guarantees amount to it."""
     if requirement.level is Level.ARGUED and not requirement.formal:
         return "argued: a person's word"
     found = requirement.weakest_evidence
-    return f"{found.status}: {found.title}" if found else "none"
+    if found is None:
+        return "none"
+    return f"{found.status}: {found.title}" + (f", {found.bound}" if found.bound else "")
 
 
 def dangers(case: Case) -> list[tuple[Tone, Level, str]]:

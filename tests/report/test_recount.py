@@ -309,6 +309,24 @@ def test_a_bound_is_computed_again_from_its_sample() -> None:
     assert any("47 runs, 0 failed" in line for line in shown(0.05))
 
 
+def test_the_weakest_evidence_of_requirements_and_hazards_is_found_again() -> None:
+    """Another bound, and another claim of those beneath."""
+    node, danger = [guarantee("n", "g"), guarantee("n", "h")], Hazard("H", "It burns", "marginal", mitigated_by=("R",))
+    asked = Requirement("R", "It is so.", "n.x > 0", None, ("n.g", "n.h"))
+    own = obligation("system", Kind.REQUIREMENT, "R", clauses=("n.g", "n.h"))
+    bounds = [{"cases": 20, "failure_probability_below": bound, "confidence": 0.95} for bound in (0.15, 0.2)]
+    records = [evidence(g, Verdict.TESTED, "hypothesis", bound=b) for g, b in zip(node, bounds, strict=True)]
+    subject = system({"n": ["g", "h"]}, requirements=[asked], hazards=[danger])
+    texts = dict(every_text(make_case(subject, [*node, own], [*records, evidence(own, method="compose")])))
+    page, data = texts["index.html"], texts["report.json"].encode()
+    assert recounted(page, data) == []
+    assert page.count("bound 20 %") == 2
+    for wrong in ("bound 20 %</td>", "n.h, tested, bound 20 %"):
+        other = wrong.replace("20 %", "15 %").replace("n.h", "n.g")
+        assert page.count(wrong) == 1
+        assert recounted(page.replace(wrong, other), data) != [], wrong
+
+
 def test_report_check_recounts(tmp_path: Path) -> None:
     found: Case = CASES["rover"]()
     render_all(found, tmp_path)
