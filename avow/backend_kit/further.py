@@ -6,7 +6,7 @@ plan assumes of the environment, a requirement whose formula is about one node a
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 
 from avow.base.diagnostics import Rejected
@@ -20,10 +20,10 @@ from avow.language.contract import Clause, ClauseKind, Node
 from avow.language.sorts import BOOL, FunctionSort
 from avow.language.subterms import histories, ports_of
 from avow.language.terms import History, Not, Past, Term
-from avow.system.folding import holders
+from avow.system.folding import holders, leaves
 from avow.system.formulas import environment_assumptions
 from avow.system.graph import dataflow
-from avow.system.plan import System
+from avow.system.plan import Requirement, System
 from avow.system.temporal import parse_state
 
 
@@ -35,6 +35,10 @@ class Further:
     claim: str
     """Its obligation's id, without the system."""
     clause: Clause
+    at_least: str = ""
+    """Of a guarantee: the success rate that the plan claims, if a method claims one instead of the guarantee itself."""
+    supports: tuple[str, ...] = ()
+    """Of a requirement: the node's guarantees under its `supported_by`."""
 
 
 @by_identity(64)
@@ -46,10 +50,16 @@ def of_plan(system: System) -> tuple[Further, ...]:
         return ()
 
 
-def guarantees(node: Node, names: Iterable[str] = ()) -> tuple[Further, ...]:
+def guarantees(system: System, node: Node, names: Iterable[str] = ()) -> tuple[Further, ...]:
     """The node's guarantees, except those of these names."""
+    rates = {
+        name: str(method.options.data["at_least"])
+        for method in system.plan.node(node.name).methods
+        for name in method.guarantees
+        if isinstance(method.options.data, Mapping) and "at_least" in method.options.data
+    }
     rest = (clause for clause in node.guarantees if clause.name not in {*names} and not clause.unwritten)
-    return tuple(Further(node.name, f"{node.name}/{Kind.GUARANTEE}/{c.name}", c) for c in rest)
+    return tuple(Further(node.name, f"{node.name}/{Kind.GUARANTEE}/{c.name}", c, rates.get(c.name, "")) for c in rest)
 
 
 def assumption(node: str, name: str) -> str:
@@ -91,7 +101,15 @@ def _requirements(system: System) -> Iterator[Further]:
         nodes = {port.name.partition(".")[0] for port in ports_of(formula)}
         if len(nodes) == 1 and not histories(formula):
             own = {p: replace(p, name=p.name.partition(".")[2]) for p in ports_of(formula)}
-            yield _further(min(nodes), ClauseKind.GUARANTEE, requirement.id, substitute(formula, own))
+            found = _further(min(nodes), ClauseKind.GUARANTEE, requirement.id, substitute(formula, own))
+            yield replace(found, supports=tuple(_supports(system, requirement, system.contract.node(found.node))))
+
+
+def _supports(system: System, requirement: Requirement, node: Node) -> Iterator[str]:
+    derived, inside = {goal.name: goal.select for goal in system.plan.compose}, leaves(system.plan)
+    named = [part for name in requirement.supported_by for part in derived.get(name, (name,))]
+    whole = any(node.name in inside.get(part, (part,)) for part in named)
+    return (c.name for c in node.guarantees if whole or f"{node.name}.{c.name}" in named)
 
 
 def _further(node: str, kind: ClauseKind, name: str, formula: Term) -> Further:

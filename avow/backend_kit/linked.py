@@ -71,6 +71,12 @@ def connected(tool: Backend, job: Job) -> bool:
     return wired(tool, job.source) or reads_recordings(tool, job)
 
 
+def sees_all(tool: Backend, method: Method) -> bool:
+    """Whether the answer may depend on the contracts of all nodes: a recording has the messages of any node."""
+    options = method.options.data
+    return tool.uses_upstream or (isinstance(options, Mapping) and tool.campaigns in options)
+
+
 def told_too(tool: Backend, job: Job) -> frozenset[str]:
     """The backends whose options for other nodes the job's answer may depend on: its own, and those that read its
     messages."""

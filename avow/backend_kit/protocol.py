@@ -448,6 +448,12 @@ class Backend(ABC):
         options in `avow.backend_kit.given.READING`, and all for a recording. Raises Rejected if they are at fault."""
         raise NotImplementedError(self.name)
 
+    def contradictions(self, job: Job, recording: Path, outside: Mapping[str, str]) -> tuple[Outcome, ...]:
+        """With `judge`: as `Report.contradicted`, the claims besides the job's that a recording refutes. `outside`: the
+        assumptions or inputs of the job's node that were not kept on purpose, and why. Raises Rejected if the plan is
+        at fault."""
+        raise NotImplementedError(self.name)
+
     def translate(self, notation: str, system: System, node: Node) -> Translated:
         """The node in one of `translations`. Pure, like `export`. Raises Rejected if the input is at fault; clauses
         that the notation cannot express are in `Translated.missing`."""

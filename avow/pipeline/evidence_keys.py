@@ -18,7 +18,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from avow.backend_kit.linked import connected, reads_recordings, told_too
+from avow.backend_kit.linked import connected, reads_recordings, sees_all, told_too
 from avow.backend_kit.protocol import Backend, Job
 from avow.base.diagnostics import Rejected
 from avow.base.files import read_regular
@@ -102,7 +102,7 @@ def surroundings(tool: Backend, job: Job, options: str, files: Iterable[Path] | 
         parts.append(scenario.digest if tool.uses_scenario and tool.uses_steps else scenario.content)
     if connected(tool, job):
         parts.append(_wiring(job.system, job.node, told_too(tool, job)))
-    parts += [_upstream_node(job, name, tool.name) for name in sorted(upstream_of(tool, job))]
+    parts += [_upstream_node(job, name, told_too(tool, job)) for name in sorted(upstream_of(tool, job))]
     if tool.uses_source and job.source is not None:
         declared = job.source
         texts = (declared.python, declared.class_name, declared.cpp, declared.parameters, declared.numbers.value)
@@ -111,7 +111,7 @@ def surroundings(tool: Backend, job: Job, options: str, files: Iterable[Path] | 
         parts += [repr(sorted(declared.values.items()))] if declared.values else []
         parts += sorted([clause.name, digest(clause.formula)] for clause in job.begins)
     if job.further:
-        parts.append(sorted([f.node, f.claim, digest(f.clause.formula)] for f in job.further))
+        parts.append(sorted([f.node, f.claim, digest(f.clause.formula), f.at_least, *f.supports] for f in job.further))
     if tool.uses_criticality:
         parts.append(["criticality", job.system.plan.node(job.node.name).criticality])
     return json.dumps(parts)
@@ -156,16 +156,16 @@ def _wiring(system: System, node: Node, backends: Collection[str]) -> list[Any]:
 
 
 def upstream_of(tool: Backend, job: Job) -> frozenset[str]:
-    """The nodes whose contracts the method may look at: a recording has the messages of any node."""
-    return frozenset(node.name for node in job.contract.nodes) if tool.uses_upstream else frozenset()
+    """The nodes whose contracts the method may look at."""
+    return frozenset(node.name for node in job.contract.nodes if sees_all(tool, job.method))
 
 
-def _upstream_node(job: Job, name: str, backend: str) -> list[Any]:
-    """A node's clauses, what feeds it, and the options of the same backend."""
+def _upstream_node(job: Job, name: str, backends: Collection[str]) -> list[Any]:
+    """A node's clauses, what feeds it, and the options of these backends."""
     node, plan = job.contract.node(name), job.system.plan.node(name)
     clauses = sorted([c.kind.value, c.name, digest(c.formula)] for c in node.clauses)
-    told = [method_options(m) for m in plan.methods if m.backend == backend and name != job.node.name]
-    return [name, clauses, _ports(node), _wiring(job.system, node, {backend}), told]
+    told = [method_options(m) for m in plan.methods if m.backend in backends and name != job.node.name]
+    return [name, clauses, _ports(node), _wiring(job.system, node, backends), told]
 
 
 def _topics(node: Node) -> list[list[str]]:

@@ -6,7 +6,7 @@ import json
 from collections.abc import Mapping
 
 from avow.backend_kit.further import Further, guarantees, of_plan
-from avow.backend_kit.linked import models, unrun
+from avow.backend_kit.linked import models, sees_all, unrun
 from avow.backend_kit.protocol import Backend, Job
 from avow.backend_kit.registry import backend, names
 from avow.base.files import sha256
@@ -60,11 +60,11 @@ def method_job(
 def _further(
     system: System, node: Node, method: Method, tool: Backend, given: tuple[Further, ...] | None
 ) -> tuple[Further, ...]:
-    """The other claims that a method's data may contradict: with `uses_upstream` of any node, else of its own."""
+    """The other claims that a method's data may contradict: of recordings of any node, else of its own."""
     if given is not None or tool.of is not Object.RECORDING:
         return given or ()
-    planned = (each for each in of_plan(system) if tool.uses_upstream or each.node == node.name)
-    return (*guarantees(node, method.guarantees), *planned)
+    planned = (each for each in of_plan(system) if sees_all(tool, method) or each.node == node.name)
+    return (*guarantees(system, node, method.guarantees), *planned)
 
 
 def _can_be_claimed(system: System, node: Node, name: ProgramClaim) -> bool:

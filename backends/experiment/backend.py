@@ -16,7 +16,7 @@ from avow.base.verdict import Link, Object, Verdict
 from avow.language.contract import Clause, Node
 
 from .campaign import NotMade, drawn, experiment, recorded, regressions
-from .further import contradictions
+from .further import contradictions, of_campaign
 from .options import SCHEMA, read
 from .profile import Campaign, command_files, read_campaign, regressions_of
 from .verdict import settle
@@ -27,7 +27,7 @@ class ExperimentBackend(Backend):
 
     name = "experiment"
     title = "recorded runs, judged by the guarantee and exact binomial statistics"
-    version = "10"
+    version = "11"
     strength = Verdict.TESTED
     remembers = True
     uses_scenario = False
@@ -103,8 +103,8 @@ class ExperimentBackend(Backend):
             link = Link.GUIDED if found.claims[o.name].interpreted else self.link
             of = self.of if campaign is None else Object.MODEL
             outcomes.append(replace(outcome, obligation=o.id, link=link, of=of))
-        beyond = tuple(contradictions(job, found)) if campaign is None else ()
-        return Report(tuple(outcomes), "avow experiment", self.version, logs=logs, contradicted=beyond)
+        beyond = contradictions(job, found) if campaign is None else of_campaign(job, campaign, found)
+        return Report(tuple(outcomes), "avow experiment", self.version, logs=logs, contradicted=tuple(beyond))
 
 
 def _campaign(job: Job) -> Campaign | None:

@@ -15,7 +15,7 @@ from dataclasses import field, replace
 from pathlib import Path
 
 from avow.backend_kit.programs.judging import Formula, triggers
-from avow.backend_kit.protocol import Job, JudgedRun
+from avow.backend_kit.protocol import Backend, Job, JudgedRun
 from avow.backend_kit.registry import judge_of_runs
 from avow.base import process
 from avow.base.diagnostics import Diagnostic, Rejected
@@ -69,8 +69,8 @@ class Made:
 Judge = Callable[[Row], Made]
 
 
-def monitors(job: Job, campaign: Campaign) -> Judge:
-    """Judges a run by its recording. Raises Rejected if the node has no monitors."""
+def monitored(job: Job, campaign: Campaign) -> tuple[Backend, Job]:
+    """What judges the recordings, and the job for it. Raises Rejected if the node has no monitors."""
     tool = judge_of_runs()
     methods = job.system.plan.node(job.node.name).methods
     method = next((m for m in methods if tool is not None and m.backend == tool.name), None)
@@ -78,7 +78,13 @@ def monitors(job: Job, campaign: Campaign) -> Judge:
         message = f"{job.node.name} has no monitors to judge the runs of its campaign"
         hint = f"add `{tool.name if tool is not None else 'rosmonitoring'}` with a `mapping` to its methods"
         raise Rejected(Diagnostic("EXP101", message, job.method.options.at("campaign"), hint=hint))
-    judge = tool.judge(replace(job, method=method, claims=()))
+    return tool, replace(job, method=method, claims=())
+
+
+def monitors(job: Job, campaign: Campaign) -> Judge:
+    """Judges a run by its recording. Raises Rejected if the node has no monitors."""
+    tool, asked = monitored(job, campaign)
+    judge = tool.judge(asked)
 
     def judged(row: Row) -> Made:
         if row.ended != OK:
@@ -206,6 +212,11 @@ def recorded(job: Job, campaign: Campaign) -> options.Experiment:
             raise NotMade(Verdict.NOT_RUN, f"the recording {name} (SHA-256 {row.sha256}) is not here")
     judge = monitors(job, campaign)
     return experiment(job, [judge(row) for row in rows], [judge(row) for row in again])
+
+
+def rows_of(campaign: Campaign) -> tuple[Row, ...]:
+    """The runs of both tables. Raises NotMade, and Rejected."""
+    return (*drawn(campaign), *regressions(campaign))
 
 
 def experiment(job: Job, made: Sequence[Made], again: Sequence[Made]) -> options.Experiment:

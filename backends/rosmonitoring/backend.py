@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from importlib import metadata
@@ -18,7 +19,7 @@ from avow.base.diagnostics import Diagnostic, Severity
 from avow.base.files import inside, read_text
 from avow.base.suggestions import nearby
 from avow.base.tools import Tool, works
-from avow.base.verdict import Link, Object, Verdict
+from avow.base.verdict import Link, Object, Outcome, Verdict
 from avow.ros.sources import message_files
 
 if TYPE_CHECKING:
@@ -42,7 +43,7 @@ class RosMonitoringBackend(Backend):
 
     name = "rosmonitoring"
     title = "runtime monitors, and recorded traces judged by them"
-    version = "16"
+    version = "17"
     strength = Verdict.MONITORED
     link = Link.MAPPED
     of = Object.RECORDING
@@ -174,6 +175,12 @@ class RosMonitoringBackend(Backend):
         from .runs import judge
 
         return judge(job)
+
+    def contradictions(self, job: Job, recording: Path, outside: Mapping[str, str]) -> tuple[Outcome, ...]:
+        from .further import of_job
+
+        name = recording.relative_to(job.root.resolve()).as_posix()
+        return tuple(of_job(job, name, recording, math.inf, outside).refuted())
 
     def discharge(self, job: Job, folder: Path, limits: Limits) -> Report:
         from .runs import discharge

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import io
+import math
 import os
 import signal
 import sys
+import tempfile
 import threading
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,6 +19,7 @@ from typing import Any, cast
 
 import click
 
+from avow.backend_kit.further import of_plan
 from avow.backend_kit.timeline import picture
 from avow.base.codec import document
 from avow.base.diagnostics import Diagnostic, Rejected
@@ -28,9 +31,10 @@ from avow.system.plan import System
 
 from .configuration import of_system
 from .engine import Monitor
+from .further import Recording
 from .judged import Recorder, ReportingMonitor
 from .lanes import Marks, signals, timeline
-from .observing import data_of, method_of
+from .observing import data_of, method_of, outside
 from .options import origin
 from .session import Session, session, violation_json
 from .tuning import VIOLATIONS_SHOWN
@@ -154,7 +158,8 @@ def _live(
     graph = graph_of(live, running, host, enforce=enforce, warn=_warn)
     with _until(seconds) as over:
         found = ((0, violation) for violation in follow(running, graph, over, record, verdicts, _warn))
-        return _report(running, found, str(record or ""), output)
+        again = (lambda: _beyond(system, nodes, record)) if record is not None else dict[str, str]
+        return _report(running, found, str(record or ""), output, again)
 
 
 @contextmanager
@@ -188,11 +193,42 @@ def _judge(system: System, nodes: tuple[str, ...], trace: str, output: _Output) 
         raise Rejected(Diagnostic("MON201", f"{path} is a part of a bag", hint=f"name the bag: `{path.parent}`"))
     running = session(system, nodes, None if trace == "-" else path, output.monitor)
     # each with the line of its event; the last line if it was found at the end of the run
-    found = running.read(cast(io.BufferedReader, sys.stdin.buffer).read1) if trace == "-" else running.run(path)
-    return _report(running, found, trace, output)
+    if trace != "-":
+        return _report(running, running.run(path), trace, output, lambda: _beyond(system, nodes, path))
+    with tempfile.NamedTemporaryFile(suffix=".jsonl") as copy:  # which is read again
+
+        def read(size: int) -> bytes:
+            data = cast(io.BufferedReader, sys.stdin.buffer).read1(size)
+            copy.write(data)
+            copy.flush()
+            return data
+
+        return _report(
+            running, running.read(read), trace, output, lambda: _beyond(system, nodes, Path(copy.name), trace)
+        )
 
 
-def _report(running: Session, violations: Iterator[tuple[int, Violation]], trace: str, output: _Output) -> int:
+def _beyond(system: System, nodes: tuple[str, ...], path: Path, trace: str = "") -> dict[str, str]:
+    """What the plan assumes of the environment, and its requirements about one node, as far as a trace breaks them:
+    claim → the breach, or why it is unknown whether it is one. As ``avow verify`` judges them."""
+    further = [each for each in of_plan(system) if not nodes or each.node in nodes]
+    if not further:
+        return {}
+    root, place = system.plan.root.resolve(), path.resolve()
+    name = trace or (place.relative_to(root).as_posix() if place.is_relative_to(root) else str(path))
+    options = {each.node: method_of(system, each.node) for each in further}
+    given = {node: outside(own, name) for node, own in options.items()}
+    recording = Recording(system, further, name, path, math.inf, options, given)
+    claims = {each.claim: f"{each.node}.{each.clause.name}" for each in further}
+    found = {each.obligation: each.summary for each in recording.refuted() if each.obligation in claims}
+    doubts = {claim: recording.doubts[clause] for claim, clause in claims.items() if clause in recording.doubts}
+    return {claim: f"unknown: {why}" for claim, why in doubts.items()} | found
+
+
+def _report(
+    running: Session, violations: Iterator[tuple[int, Violation]], trace: str, output: _Output,
+    beyond: Callable[[], Mapping[str, str]] = dict,
+) -> int:  # fmt: skip
     """Show the violations, and the results of each clause. Returns the exit code."""
 
     shown: list[dict[str, Any]] = []
@@ -212,17 +248,21 @@ def _report(running: Session, violations: Iterator[tuple[int, Violation]], trace
                 shown.append({**violation_json(violation), "line": line})
             else:
                 click.echo(violation.text())
+    further = dict(beyond())
     if output.timeline is not None:
         _draw(running, Path(trace), marks, output.timeline)
     if output.as_json:
         digest = "" if trace in ("-", "") else digest_trace(Path(trace))
-        click.echo(document({**running.summary(), "trace": trace, "sha256": digest, "violations": shown}))
+        told = {"trace": trace, "sha256": digest, "violations": shown, "contradicted": further}
+        click.echo(document({**running.summary(), **told}))
     else:
         for (node, clause, fault), count in () if output.show_all else counts.items():
             if count > VIOLATIONS_SHOWN:
                 click.echo(f"… and {count - VIOLATIONS_SHOWN} more of {node}.{clause}: {fault} (--all shows them)")
-        _print_summary(running)
-    return 0 if running.clean and _anything_judged(running) and not running.unmonitored() else 1
+        for claim, why in further.items():
+            click.echo(f"{claim}: {why}")
+        _print_summary(running, len(further))
+    return 0 if running.clean and not further and _anything_judged(running) and not running.unmonitored() else 1
 
 
 def _recorder(running: Session, path: Path) -> Recorder:
@@ -258,7 +298,7 @@ def _anything_judged(running: Session) -> bool:
     return any(tally.judged for *_, tally in running.clauses())
 
 
-def _print_summary(running: Session) -> None:
+def _print_summary(running: Session, further: int) -> None:
     silent = (topic for monitor in running.monitors for topic in monitor.silent.values() if running.unheard)
     for topic in dict.fromkeys(silent):
         click.echo(f"  {silent_topic(topic, running.unheard)}")
@@ -290,6 +330,7 @@ def _print_summary(running: Session) -> None:
         click.echo(f"topics of the trace that no clause uses, and their events: {told}")
         click.echo(f"topics listened to: {', '.join(running.topics) or 'none'}")
     summary = [f"{count} × {fault}" for fault, count in running.counts.items()]
+    summary += [f"{further} × claim of the plan not met, or unknown"] if further else []
     if not any(True for _ in running.clauses()):
         summary.append("nothing was judged: write what a node promises in place of `to_write`")
     elif not _anything_judged(running):

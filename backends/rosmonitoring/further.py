@@ -1,14 +1,14 @@
 """What a recording breaks besides the guarantees that the plan names it for: guarantees and assumptions of any node,
 what the plan assumes of the environment, and requirements about one node.
 
-The first node of the contract that names a recording judges all of that, as ``avow monitor`` does.
+The first node of the contract that names a recording judges all of that; ``avow monitor`` and campaigns judge theirs.
 """
 
 from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from avow.backend_kit.further import Further, assumption, contradicted
@@ -20,7 +20,7 @@ from avow.formulas.formula import free_variables
 from avow.language.contract import Clause, ClauseKind, Node
 from avow.language.subterms import ports_of
 from avow.language.terms import Role
-from avow.system.plan import Located
+from avow.system.plan import Located, System
 
 from .engine import Monitor
 from .notes import readable
@@ -38,18 +38,20 @@ class _Apart(Session):
         return iter(violations)
 
 
-def contradictions(job: Job, names: Sequence[str], seconds: float) -> tuple[tuple[Outcome, ...], str]:
-    """The claims that these recordings refute, each once, and why not all of them could be judged."""
+def contradictions(job: Job, names: Sequence[str], seconds: float) -> tuple[tuple[Outcome, ...], tuple[str, ...], str]:
+    """The claims that these recordings refute, each once; the assumptions that they refute no other; and why not all
+    claims could be judged."""
     found: dict[str, Outcome] = {}
+    doubts: list[str] = []
     for name in names:
         path = inside(job.root, name)
         if path is not None and _leads(job, name):
-            one = _Recording(job, name, path, time.process_time() + seconds)
-            for each in one.refuted():
-                found.setdefault(each.obligation, each)
+            one = of_job(job, name, path, time.process_time() + seconds)
+            found = {each.obligation: each for each in one.refuted()} | found
+            doubts += one.doubts.values()
             if one.late:
-                return tuple(found.values()), one.late
-    return tuple(found.values()), ""
+                return tuple(found.values()), tuple(doubts), one.late
+    return tuple(found.values()), tuple(doubts), ""
 
 
 def _leads(job: Job, name: str) -> bool:
@@ -58,46 +60,66 @@ def _leads(job: Job, name: str) -> bool:
     return next(naming) == own
 
 
-class _Recording:
-    def __init__(self, job: Job, name: str, path: Path, deadline: float) -> None:
-        self.job, self.name, self.path, self.deadline = job, name, path, deadline
-        self.late = ""
+def of_job(job: Job, name: str, path: Path, deadline: float, apart: Mapping[str, str] | None = None) -> Recording:
+    """A recording, for a job: what `apart` names was not kept on purpose (by default, what the plan's entry names)."""
+    options = {n.name: method_of(job.system, n.name) for n in job.contract.nodes} | {job.node.name: job.method.options}
+    given = {node: outside(own, name) for node, own in options.items()}
+    given |= {} if apart is None else {job.node.name: apart}
+    return Recording(
+        job.system, job.further, name, path, deadline, options, given, frozenset(o.local_id for o in job.obligations)
+    )
+
+
+@dataclass
+class Recording:
+    system: System
+    further: Sequence[Further]
+    name: str
+    path: Path
+    deadline: float
+    """In seconds of processor time."""
+    options: Mapping[str, Located | None]
+    """Node → its method's options, for each node that is judged."""
+    outside: Mapping[str, Mapping[str, str]]
+    """Node → what was not kept on purpose, and why."""
+    answered: frozenset[str] = frozenset()
+    """The claims that the job itself answers."""
+    late: str = ""
+    doubts: dict[str, str] = field(default_factory=dict)
+    """Clause → the assumption that no step breaks it: the recording's order does, and the order of steps is unknown."""
+
+    def __post_init__(self) -> None:
+        nodes = self.system.contract.nodes
         self.apart: dict[str, set[str]] = {}
         """Node → the ports whose messages did not come from the system, according to the plan."""
-        for node in job.contract.nodes:
-            given = outside(self._options(node), name)
+        for node in nodes:
+            given = self.outside.get(node.name, {})
             ports = {v.name for c in node.assumptions if c.name in given for v in ports_of(c.formula)}
             self.apart[node.name] = ports | {key.removeprefix("in.") for key in given}
-        self.played = {
-            source.node
-            for node in job.contract.nodes
-            for port in self.apart[node.name]
-            for source in sources(job.system, node, port)
-        }
-
-    def _options(self, node: Node) -> Located | None:
-        return self.job.method.options if node.name == self.job.node.name else method_of(self.job.system, node.name)
+        played = (sources(self.system, node, port) for node in nodes for port in self.apart[node.name])
+        self.played = {source.node for found in played for source in found}
 
     def refuted(self) -> Iterator[Outcome]:
-        setups = {node.name: made for node in self.job.contract.nodes if (made := self._setup(node)) is not None}
+        nodes = [node for node in self.system.contract.nodes if node.name in self.options]
+        setups = {node.name: made for node in nodes if (made := self._setup(node)) is not None}
         runs = self._judge(Session, [self._promising(made) for made in setups.values()])
         broken = {each.obligation: each for run in runs for each in self._guarantees(run)}
-        yield from broken.values()
+        yield from (each for each in broken.values() if each.obligation not in self.answered)
         for run in runs:
             yield from self._assumptions(run, broken)
-        claims = [f for f in self.job.further if f.clause.kind is ClauseKind.ASSUMPTION and f.node in setups]
+        claims = [f for f in self.further if f.clause.kind is ClauseKind.ASSUMPTION and f.node in setups]
         for run in self._judge(_Apart, [self._assumed(setups[f.node], f) for f in claims]) if claims else ():
             yield from self._environment(run, claims)
 
     def _setup(self, node: Node) -> Setup | None:
         if node.relay:
             return None
-        made, faults = setup(self.job.system, node, self._options(node))
-        return None if faults or readable(made, self.path, origin(self.job.system)) else made
+        made, faults = setup(self.system, node, self.options[node.name])
+        return None if faults or readable(made, self.path, origin(self.system)) else made
 
     def _promising(self, made: Setup) -> Monitor:
         """A node's monitor, that also judges the requirements about it."""
-        about = [f for f in self.job.further if f.node == made.node.name]
+        about = [f for f in self.further if f.node == made.node.name]
         required = tuple(f.clause for f in about if f.claim.startswith(f"system/{Kind.REQUIREMENT}/"))
         ports = self.apart[made.node.name]
         excused = tuple(f.clause for f in about if f.clause.kind is ClauseKind.ASSUMPTION and _names(f.clause) & ports)
@@ -111,7 +133,7 @@ class _Recording:
 
     def _judge(self, kind: type[Session], monitors: Sequence[Monitor]) -> list[Run]:
         runs = [Run(self.name, monitor) for monitor in monitors]
-        whole = kind(self.job.system, tuple(monitors))
+        whole = kind(self.system, tuple(monitors))
         for _, violations in whole.judged(self.path):
             for run in runs if violations else ():
                 names = {c.name for c in run.monitor.setup.node.clauses}
@@ -122,50 +144,57 @@ class _Recording:
         return runs
 
     def _guarantees(self, run: Run) -> Iterator[Outcome]:
-        node, claims = run.monitor.setup.node, {f.clause.name: f.claim for f in self.job.further}
-        own = {o.name for o in self.job.obligations} if node.name == self.job.node.name else set()
+        node = run.monitor.setup.node
+        claims = {f.clause.name: f.claim for f in self.further if f.node == node.name}
         if node.name in self.played:
             return
         for clause in node.guarantees:
-            if clause.name in own or clause.unwritten:
+            if clause.unwritten:
                 continue
+            claim = claims.get(clause.name, f"{node.name}/{Kind.GUARANTEE}/{clause.name}")
             spoken = frozenset(v.qualified for v in free_variables(clause.formula))
             answer = outcome("", Shown(clause.name, [run], spoken, "an assumption was broken"))
             if answer.verdict is Verdict.REFUTED and answer.counterexample is not None:
-                claim = claims.get(clause.name, f"{node.name}/{Kind.GUARANTEE}/{clause.name}")
                 yield contradicted(claim, answer.summary, answer.counterexample)
+            elif answer.counterexample is not None and claim not in self.answered:
+                self._doubt(f"{node.name}.{clause.name}", answer.counterexample.explanation)
 
     def _assumptions(self, run: Run, broken: Mapping[str, Outcome]) -> Iterator[Outcome]:
         """The broken assumptions. One that another node's breach caused is discharged by what that breach refutes."""
         node = run.monitor.setup.node
-        own = {c.name for c in self.job.contract.node(node.name).assumptions}
+        own = {c.name for c in self.system.contract.node(node.name).assumptions}
         for v in run.first.values():
             if v.fault not in (Fault.ASSUMPTION, Fault.PROVIDER) or v.clause not in own or node.name in self.played:
                 continue
             by = v.origin.replace(".", f"/{Kind.GUARANTEE}/", 1)
-            if by not in broken and self._is_sure(run, node.clause(v.clause)):
-                yield self._told(assumption(node.name, v.clause), v)
+            if by not in broken:
+                yield from self._told(run, assumption(node.name, v.clause), v)
 
     def _environment(self, run: Run, claims: Sequence[Further]) -> Iterator[Outcome]:
         (clause,) = run.monitor.setup.node.assumptions
         claim = next(f.claim for f in claims if f.node == run.monitor.setup.node.name and f.clause == clause)
         first = next((v for v in run.first.values() if v.fault is Fault.ASSUMPTION), None)
-        if first is not None and self._is_sure(run, clause):
-            yield self._told(claim, first)
+        if first is not None:
+            yield from self._told(run, claim, first)
 
-    def _is_sure(self, run: Run, clause: Clause) -> bool:
-        """Whether a breach is one of values that belong together: of one topic, or of one step."""
-        monitor = run.monitor
+    def _told(self, run: Run, claim: str, v: Violation) -> Iterator[Outcome]:
+        """A breach refutes if its values belong together: if they are of one topic, or of one step."""
+        monitor, clause = run.monitor, run.monitor.setup.node.clause(v.clause)
+        if _names(clause) & self.apart[monitor.setup.node.name]:
+            return
         rules = monitor.setup.carried
         topics = {same_topic(rule.topic) for name in _qualified(clause) if (rule := rules.get(name)) is not None}
         together = len(topics) == 1 or monitor.word is not None
-        known = not monitor.backwards and not monitor.tallies[clause.name].unpaired
-        return together and known and not _names(clause) & self.apart[monitor.setup.node.name]
-
-    def _told(self, claim: str, v: Violation) -> Outcome:
         when = f" (t = {v.time})" if v.time else ""
         about = f"event {v.index}{when} of {self.name}: {v.explanation}"
-        return contradicted(claim, f"broken at {about}", Counterexample((*v.bindings, *v.values), about))
+        if together and not monitor.backwards and not monitor.tallies[clause.name].unpaired:
+            yield contradicted(claim, f"broken at {about}", Counterexample((*v.bindings, *v.values), about))
+        else:
+            self._doubt(f"{monitor.setup.node.name}.{v.clause}", about)
+
+    def _doubt(self, clause: str, about: str) -> None:
+        why = "in the order of the recording it does, but the order of the steps is unknown"
+        self.doubts.setdefault(clause, f"no step breaks {clause}: {why} ({about})")
 
 
 def _names(clause: Clause) -> set[str]:

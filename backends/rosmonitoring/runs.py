@@ -70,11 +70,9 @@ def discharge(job: Job, traces: Mapping[str, str], limits: Limits) -> Report:
     excuse = _excuse(job, runs)
     outcomes = tuple(outcome(o.id, Shown(o.name, runs, _spoken(job, o), excuse)) for o in job.obligations)
     whole = [run.name for run in runs if run.monitor.events and not (run.trouble or run.missing or run.unknown)]
-    beyond, late = contradictions(job, whole, limits.seconds)
-    if late:
-        outcomes = tuple(
-            replace(o, verdict=Verdict.UNKNOWN, summary=late) if o.verdict.supports else o for o in outcomes
-        )
+    beyond, doubts, late = contradictions(job, whole, limits.seconds)
+    told: dict[str, Any] = {"verdict": Verdict.UNKNOWN, "summary": late} if late else {"hypotheses": doubts}
+    outcomes = tuple(replace(o, **told) if o.verdict.supports else o for o in outcomes)
     aside = [f"{n}: outside of {key} on purpose: {why}" for n in traces for key, why in _outside(job, n).items()]
     outcomes = tuple(replace(o, summary="; ".join((o.summary, *aside))) for o in outcomes)
     for obligation, each in zip(job.obligations, outcomes, strict=True):

@@ -14,6 +14,7 @@ from avow.assurance.codec import read_case
 from avow.base.verdict import Verdict
 from avow.base.workspace import Workspace
 from avow.evidence.ledger import ledger_of
+from avow.evidence.record import Evidence
 from avow.evidence.status import Status
 from avow.pipeline.discharge import discharge, open_obligations
 from avow.pipeline.run_info import Run
@@ -41,6 +42,7 @@ nodes:
 """
 TRACE = "rosmonitoring: {traces: [t.jsonl], answers: {by: arrival, because: one process}}"
 TABLE = "experiment: {data: t.csv, mapping: {in.y: y, out.z: z}}"
+RATED = TABLE.replace("data", "at_least: 0.8, data")
 A, SMALL, X, Z = "a/guarantee/g", "composition/whole.b.small", "composition/environment.a.x", "requirement/Z"
 Steps = Sequence[tuple[float, float, float]]
 """The values of x, y and z."""
@@ -69,14 +71,18 @@ def write(place: Workspace, method: str, steps: Steps) -> Path:
     return folder
 
 
-def refuted(place: Workspace, folder: Path) -> set[str]:
+def records(place: Workspace, folder: Path) -> list[Evidence]:
     found = survey(folder)
     assert isinstance(found, Survey), found
     for work in (w for w in found.catalogue.works if w.planned is not None):
         discharge(place, work, Run("run", False))
         assert not open_obligations(place, work, Run("later", False)), "a later run has nothing to do"
-    records = (entry.evidence for entry in ledger_of(place.ledger("s")).records())
-    return {r.obligation.removeprefix("s/").removeprefix("system/") for r in records if r.verdict is Verdict.REFUTED}
+    return [entry.evidence for entry in ledger_of(place.ledger("s")).records()]
+
+
+def refuted(place: Workspace, folder: Path) -> set[str]:
+    found = (r for r in records(place, folder) if r.verdict is Verdict.REFUTED)
+    return {r.obligation.removeprefix("s/").removeprefix("system/") for r in found}
 
 
 GOOD = [(1.0, float(k % 10), float(k % 10)) for k in range(40)]
@@ -90,6 +96,9 @@ GOOD = [(1.0, float(k % 10), float(k % 10)) for k in range(40)]
         (TRACE, (1.0, 10.5, 11.2), {A, Z}),
         (TABLE, (1.0, 50.0, 51.0), {SMALL}),
         (TABLE, (1.0, 10.5, 11.2), {Z}),
+        (RATED, (1.0, 10.5, 11.2), {Z}),  # b.h, for which the rate is claimed, holds in this row
+        (RATED, (1.0, 9.0, 20.0), set()),  # the rate of b.h counts this row
+        (RATED.replace("at_least: 0.8, ", ""), (1.0, 9.0, 20.0), {"b/guarantee/h", Z}),
     ],
 )
 def test_data_refute_what_they_contradict(
@@ -132,3 +141,62 @@ def test_the_gates_fail_for_what_a_recording_contradicts(place: Workspace) -> No
     case = read_case(place.report("s"))
     status = {view.obligation.local_id: view.status for view in case.obligations}
     assert status[f"system/{X}"] is Status.REFUTED
+
+
+def test_a_rate_of_a_guarantee_that_supports_it_not_covers_no_requirement(place: Workspace) -> None:
+    folder = write(place, RATED, [*GOOD, (1.0, 9.0, 20.0)])
+    edit(folder / "plan.yaml", ("[a.g, b.h]", "[a.g]"))
+    assert refuted(place, folder) == {Z}
+
+
+def test_avow_monitor_judges_the_environment_and_requirements_as_avow_verify_does(place: Workspace) -> None:
+    folder = write(place, TRACE, [*GOOD, (200.0, 5.0, 5.0), (1.0, 10.5, 11.2)])
+    for trace in (str(folder / "t.jsonl"), "-"):
+        told = avow("monitor", "s", trace, "--json", cwd=place.root, stdin=(folder / "t.jsonl").read_text())
+        assert told.returncode == 1
+        assert {c.removeprefix("system/") for c in json.loads(told.stdout)["contradicted"]} == {X, Z}
+    assert refuted(place, folder) == {A, X, Z}
+    told = avow("monitor", "s", str(write(place, TRACE, GOOD) / "t.jsonl"), cwd=place.root)
+    assert told.returncode == 0, told.stdout
+
+
+def test_a_breach_in_an_unknown_order_of_steps_is_an_assumption(place: Workspace) -> None:
+    folder = write(place, TRACE, GOOD)  # nothing says which x a value of y answers
+    edit(folder / "s.rcl", ("out.y <= 10", "out.y <= in.x + 7"))
+    found = [r for r in records(place, folder) if r.backend == "rosmonitoring"]
+    assert [(r.verdict, len(r.hypotheses)) for r in found] == [(Verdict.MONITORED, 1)]
+    assert str(found[0].hypotheses[0]).startswith("no step breaks a.g: in the order of the recording it does")
+
+
+WORLD = """import json, sys
+with open(sys.argv[1], "w") as file:
+    for n, (topic, value) in enumerate([("x", 1.0), ("y", float(sys.argv[2])), ("z", float(sys.argv[2]))]):
+        print(json.dumps({"topic": topic, "time": n, "data": value}), file=file)
+"""
+CAMPAIGN = """rosmonitoring: {answers: {by: arrival, because: one process}}, experiment: {data: runs.csv, seed: 1, RATE,
+    campaign: {command: [python3, world.py, "{trace}", "{y}"], scenario: {y: {from: 0, to: 9}}, trace: r.jsonl,
+      runs: 20}}
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("fault", "broken"),
+    [
+        (("1.0", "1.0"), set()),
+        (('("x", 1.0)', '("x", 200.0)'), {X}),
+        (('("y", float(sys.argv[2]))', '("y", 11.0)'), {A}),
+        (('("z", float(sys.argv[2]))', '("z", 11.1 - (float(sys.argv[2]) < 8) * 9)'), {Z}),  # at times, as h allows
+    ],
+)
+def test_runs_of_a_campaign_refute_what_they_contradict(
+    place: Workspace, fault: tuple[str, str], broken: set[str]
+) -> None:
+    for rate in ("confidence: 0.95", "at_least: 0.8"):
+        folder = write(place, CAMPAIGN.replace("RATE", rate), GOOD)
+        edit(folder / "s.rcl", ("out.z <= in.y + 1", "out.z <= in.y + 4"))
+        (folder / "world.py").write_text(WORLD)
+        edit(folder / "world.py", fault)
+        told = avow("campaign", "s", cwd=place.root)
+        assert told.returncode == 0, told.stdout + told.stderr
+        assert refuted(place, folder) == broken
