@@ -36,7 +36,7 @@ from avow.calculus.model_checking import cannot_run, explored, judge_property
 from avow.calculus.questions import Answer, as_far_as_shown, certified
 from avow.calculus.scenario import CannotRun
 from avow.calculus.trials import composes
-from avow.calculus.variables import Frame, Observed, system_term
+from avow.calculus.variables import Frame, Observed, framed, system_term
 from avow.evidence.record import COMPOSES
 from avow.formulas.formula import digest, negation
 from avow.language.printer import show_term
@@ -44,6 +44,7 @@ from avow.language.terms import FALSE, Term
 from avow.sanity.claims import triggers
 from avow.sanity.mutants import mutants
 from avow.solving.questions import Entailment, solve
+from avow.system.formulas import environment_assumptions
 from avow.system.plan import Requirement
 from avow.system.temporal import Operator, Property, State, Temporal, parse_property, show_property, states_of
 
@@ -78,7 +79,22 @@ class FormulaQuestion:
         if answer.established is not None:
             more = composes(frame, system_term(frame, self.formula), answer.established)
             answer = replace(answer, details={**answer.details, COMPOSES: more})
+        why = why or (self.dead_condition(composition, bounds) if self.name in frame.observed else "")
         return _says_nothing(answer, why or self.unused_support(frame, answer, assumed))
+
+    def dead_condition(self, composition: Composition, bounds: Bounds) -> str:
+        """Why a condition of a formula about other steps never comes about; otherwise empty. The condition's absence is
+        asked for as a requirement is: it may follow only from one step to the next."""
+        system, graph = composition.frame.system, composition.frame.graph
+        brief = replace(bounds, effort=min(CONSISTENT_EFFORT, bounds.effort))
+        for trigger in triggers(composition.frame.required[self.name]):
+            absent = {self.name: negation(trigger)}
+            apart = replace(composition, frame=framed(system, graph, environment_assumptions(system, graph), absent))
+            asked = formula_question(apart.frame, self.name, ())
+            answer = _Whether(asked.name, asked.formula, "", "", (), asked.unsaid).attempt(apart, brief)
+            if answer.verdict is Verdict.PROVED and not asked.unsaid:
+                return f"its condition never comes about: {show_term(trigger)} is excluded: {answer.summary}"
+        return ""
 
     def unused_support(self, frame: Frame, answer: Answer, assumed: Mapping[str, Term]) -> str:
         """Why the proof of a formula uses no guarantee, or none that the plan names as its support; otherwise empty."""
@@ -237,6 +253,16 @@ class FormulaQuestion:
             text = f"the contracts allow {self.name} to be false{' ' + when if when else ''}"
             return Answer(Verdict.REFUTED, text, Counterexample(answer.counterexample.values, text), details=details)
         return Answer(Verdict.UNKNOWN, f"the solver gave up: {answer.reason}", details={"genuine": False})
+
+
+class _Whether(FormulaQuestion):
+    """As `FormulaQuestion`, without a certificate."""
+
+    def proved(
+        self, composition: Composition, answers: tuple[Entailment, ...], *rest: object, **more: object
+    ) -> Answer:
+        needed = dict.fromkeys(label for answer in answers for label in answer.needed if not about_memory(label))
+        return Answer(Verdict.PROVED, f"it follows from {listed(tuple(needed), 6)}")
 
 
 @dataclass(frozen=True, slots=True)

@@ -75,14 +75,15 @@ ALL = ["a.keeps", "a.busy", "b.keeps", "b.same"]
 @pytest.mark.parametrize(
     ("formula", "at_once", "beyond"),
     [
-        ("a.raw > 0 -> b.y > 0", True, []),  # of b's ports the condition says nothing
-        ("a.raw > 0 -> a.x > 0", True, []),
-        ("a.raw > 0 and a.mode -> b.y > 0", True, ["a.keeps"]),
-        ("(a.raw > 0 -> b.y > 0) and (a.mode and a.raw > 0 -> b.y > 0)", True, ["a.keeps"]),
+        ("a.raw > 0 -> b.y > 0", True, ["b.same"]),  # b.same is tried where x is not above 0, too
+        ("a.raw > 0 -> a.x > 0", True, ["b.same"]),
+        ("a.raw > 0 and a.mode -> b.y > 0", True, ["a.keeps", "b.same"]),
+        ("a.raw > 9 -> b.y > 0", True, ["a.keeps", "a.busy", "b.same"]),
+        ("(a.raw > 0 -> b.y > 0) and (a.mode and a.raw > 0 -> b.y > 0)", True, ["a.keeps", "b.same"]),
         ("a.raw > 0 and a.x < 9 -> b.y > 0", True, ALL),
         ("a.x > 5 -> b.y > 1", True, ALL),
         ("b.y == a.x", True, []),
-        ("historically(a.raw > 0 -> a.x > 0)", False, []),
+        ("historically(a.raw > 0 -> a.x > 0)", False, ["b.same"]),
         ("previous(a.raw > 0, FALSE) -> previous(b.y > 0, TRUE)", False, ALL),
     ],
 )
@@ -91,6 +92,22 @@ def test_conditions_count_as_far_as_a_nodes_ports_show_them(
 ) -> None:
     plan = f'{WORLD}requirements: {{R: {{text: Well, formula: "{formula}"}}}}\n'
     assert composed(tmp_path, LINE, plan) == {"at_once": at_once, "beyond": beyond}
+
+
+EXACT = """
+node a { inputs( raw : REAL ) outputs( x : REAL ) topics() guarantee near ( in.raw >= 100 -> out.x == in.raw ) }
+node b { inputs( x : REAL ) outputs( stop : BOOL ) topics() guarantee stops ( in.x >= 5 -> out.stop ) }
+"""
+
+
+@pytest.mark.parametrize(("limit", "beyond"), [("100", ["b.stops"]), ("5", [])])
+def test_trials_at_inputs_that_the_condition_excludes_do_not_count(
+    tmp_path: Path, limit: str, beyond: list[str]
+) -> None:
+    """A sensor that reports what it measures passes only 100 and more on where the requirement asks something."""
+    plan = WORLD.replace(", in.mode: {because: any}", "")
+    plan += f'requirements: {{R: {{text: Well, formula: "a.raw >= {limit} -> b.stop"}}}}\n'
+    assert composed(tmp_path, EXACT.replace("100", limit), plan)["beyond"] == beyond
 
 
 RELAY = """
