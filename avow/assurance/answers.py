@@ -85,7 +85,7 @@ MEANINGS = {
     Level.ARGUED: "a person vouches for the sentence or for a guarantee below",
     Level.NOT_SHOWN: "evidence is missing or stale, it is not validated, or a claim below is not shown or refuted",
     Level.REFUTED: "there is a counterexample",
-    Level.EXAMINED: "known-bad material, or a plan that names no requirement",
+    Level.EXAMINED: "a plan that lists its expected findings, or names no requirement",
 }
 """The meaning of each verdict's word, in a phrase; docs/reading-a-report.md has the same table."""
 
@@ -376,7 +376,7 @@ class Answers:
     statement: str
     """The statement that a signer makes."""
     warned: str = field(default="", metadata=LATER)
-    """``WARNED: 13 findings known``, beside the verdict; empty if nothing is known to be bad."""
+    """``13 findings against it, which the plan lists``, beside the verdict; empty if nothing is known to be bad."""
     owners: str = field(default="", metadata=LATER)
     """The owners of the assumptions, and the day on which the first one ends; empty if there are none."""
     weakened_by: str = field(default="", metadata=LATER)

@@ -113,7 +113,7 @@ def _came_or_went(
             )
         case "gate":
             kind = "demand" if now is None else "open" if said == "fails" else "new"
-            words = f"gate “{subject}”: {before or 'not asked'} → {after or 'not asked any more'}"
+            words = f"gate “{subject}”: {before or 'did not apply'} → {after or 'does not apply any more'}"
         case "assumption" | "accepted" | "expected":
             kind = "better" if now is None else "assumption"
             named = said if about == "assumption" else f"{subject}: {said}"

@@ -49,7 +49,7 @@ _WORDS = {
         "translated by a person",
         "Nothing shows that the person's table or measure is right.",
     ),
-    "unrun": ("planned method{s} without an answer", "not answered", "A tool is missing, gave up or failed."),
+    "unrun": ("planned method{s} without an answer", "not answered", "A tool is missing, failed or gave no verdict."),
     "programs": (
         "claim{s} about a node's program not run",
         "programs not run",

@@ -93,11 +93,6 @@ def weakest_of(
     )
 
 
-WARNED = "WARNED"
-"""The word beside the verdict if every gate passes although something is known to be bad: an expected refutation, or an
-accepted finding."""
-
-
 def answers(
     requirements: Sequence[RequirementView],
     nodes: Sequence[NodeView],
@@ -123,17 +118,14 @@ def answers(
     warned = ""
     bad = sum(bool(view.handled) and not view.standing.supports for view in views)
     if bad and passed:  # whatever else holds: with a known-bad finding the case is not green
-        warned, tone = (
-            f"{WARNED}: {count(bad, 'finding')} known",
-            Tone.RED if strict else min(tone, Tone.AMBER, key=_rank),
-        )
+        warned = f"{count(bad, 'finding')} against it, which the plan lists"
+        tone = Tone.RED if strict else min(tone, Tone.AMBER, key=_rank)
     by_level = tuple((level, number[level]) for level in _WORST_FIRST if number[level])
     asked = [gate for gate in gates if not gate.idle]
     good = sum(gate.passed for gate in asked)
     relaxed = [gate.title for gate in asked if gate.relaxed]
     idle = f", {len(relaxed)} relaxed by the plan" if relaxed else ""
-    idle += f", {len(gates) - len(asked)} not asked" if len(asked) < len(gates) else ""
-    idle += " of known-bad material" if len(asked) < len(gates) and strict else ""
+    idle += f", {off} do{'es' * (off == 1)} not apply" if (off := len(gates) - len(asked)) else ""
     idle += f" (relaxed: {'; '.join(relaxed)})" if relaxed else ""
     kinds = len(deficits)
     by_node: dict[str, list[ObligationView]] = {node.name: [] for node in nodes}
@@ -236,7 +228,7 @@ def _basis(
     counted = {what: ", ".join(f"{many} {said}" for said, many in of.items()) for what, of in by_object.items()}
     words = "; ".join(" ".join((many, what)).strip() for what, many in counted.items()) or "no guarantees"
     wrong = {v.obligation.kind is Kind.PROGRAM for v in views if v not in own and v.status in _WRONG and not v.advice}
-    words += "".join(f"; {'program' if of_program else 'contract'} refuted" for of_program in sorted(wrong))
+    words += "".join(f"; a check of its {'program' if program else 'contract'} fails" for program in sorted(wrong))
     squares = tuple((LETTERS.get(said, "✘"), tone) for (said, tone), _ in marks)
     worst = min((tone.rank for _, tone in squares), default=Tone.GREEN.rank)
     share = sum(tone.rank == worst for _, tone in squares) / max(1, len(squares))

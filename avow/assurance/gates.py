@@ -17,7 +17,7 @@ from avow.assurance.model import DerivationView, Gate, Handled, ObligationView, 
 from avow.assurance.naming import derivation_claim, requirement_claim, short
 from avow.assurance.policy import Demand, Policy
 from avow.assurance.relied import Relied, looked_at
-from avow.assurance.risk_gates import hazards_gate, rates_gate
+from avow.assurance.risk_gates import hazards_gate, rates_gate, steps
 from avow.base.plain import count, listed
 from avow.base.verdict import Object
 from avow.evidence.claims import Standing
@@ -65,7 +65,7 @@ def gates(
         *_programs(facts, obligations, relied, excused),
         _derivations(facts, derivations, views, excused, {view.id for view in unwritten} | behind),
         _requirements(facts, requirements, derivations, views, excused, granted),
-        *hazards_gate(hazards),
+        *hazards_gate(hazards, views),
         *rates_gate(facts.policy, requirements, views),
         *_certified(facts, proofs, fresh),
     )
@@ -295,7 +295,7 @@ def _derivations(
         not bad,
         reason or holding,
         names,
-        _steps(s for d in bad for name in d.below if name in views for s in _suggestion(views[name])),
+        steps(s for d in bad for name in d.below if name in views for s in _suggestion(views[name])),
         let_off,
         "",
         bool(bad) and all(_tool_only(d.below, views) for d in bad),
@@ -338,7 +338,7 @@ def _requirements(
         not bad,
         reason or _holding([r.level.holds for r in requirements], bool(good), len(let_off)),
         tuple(requirement_claim(r.id) for r in bad),
-        _steps(found),
+        steps(found),
         let_off,
         _in_words(good) + (_GRANTED if grants(facts.policy) else ""),
         bool(bad) and all(_tool_only(r.below, views) for r in bad),
@@ -429,7 +429,7 @@ def _gate(
         not bad,
         shown + more if bad else good + pardoned,
         tuple(view.id for view in bad),
-        _steps(s for view in bad for s in _suggestion(view)),
+        steps(s for view in bad for s in _suggestion(view)),
         let_off,
         asks,
         bool(bad) and all(view.status in _TOOL for view in bad),
@@ -449,11 +449,6 @@ def _holding(supported: Sequence[bool], asked: bool, excused: int = 0) -> str:
 
 def _suggestion(view: ObligationView) -> tuple[Suggestion, ...]:
     return (view.suggestion,) if view.suggestion else ()
-
-
-def _steps(found: Iterable[Suggestion]) -> tuple[Suggestion, ...]:
-    """At most ten, the cheapest first."""
-    return tuple({s.text: s for s in sorted(found, key=lambda s: (s.cost, s.text))}.values())[:10]
 
 
 def suggestion_for(view: ObligationView, facts: Facts, today: date) -> Suggestion | None:

@@ -393,7 +393,7 @@ class Gate:
     def state(self) -> str:
         passes = "passes but for findings that the plan excuses" if self.excused else "passes"
         passes += ", relaxed by the plan" if self.relaxed else ""
-        return "not asked" if self.idle else passes if self.passed else "fails"
+        return "does not apply" if self.idle else passes if self.passed else "fails"
 
     @property
     def mark(self) -> str:

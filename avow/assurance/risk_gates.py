@@ -16,7 +16,12 @@ from avow.base.plain import count, listed
 from avow.evidence.obligation import Kind
 
 
-def hazards_gate(hazards: Sequence[HazardView]) -> Iterable[Gate]:
+def steps(found: Iterable[Suggestion]) -> tuple[Suggestion, ...]:
+    """At most ten, the cheapest first."""
+    return tuple({s.text: s for s in sorted(found, key=lambda s: (s.cost, s.text))}.values())[:10]
+
+
+def hazards_gate(hazards: Sequence[HazardView], views: Mapping[str, ObligationView]) -> Iterable[Gate]:
     """A gate: each hazard has mitigations, and all of them hold; no gate if no hazard is listed."""
     if not hazards:
         return
@@ -24,7 +29,8 @@ def hazards_gate(hazards: Sequence[HazardView]) -> Iterable[Gate]:
     open_ones = [view for view in hazards if view.mitigations and not view.level.holds]
     reasons = [f"{listed([view.hazard.id for view in bare])}: no mitigation"] if bare else []
     reasons += [f"{view.hazard.id}: {view.stands}" for view in open_ones]
-    remedies = []
+    failing = [view for h in open_ones for name in h.closure if not (view := views[name]).standing.supports]
+    remedies = [view.suggestion for view in failing if view.suggestion]
     if bare:
         where = f"in {bare[0].hazard.span.file}" if bare[0].hazard.span else "with the hazard"
         text = f"name what mitigates {bare[0].hazard.id} under mitigated_by, {where}"
@@ -38,7 +44,7 @@ def hazards_gate(hazards: Sequence[HazardView]) -> Iterable[Gate]:
         not reasons,
         "; ".join(reasons) or f"{count(len(hazards), 'hazard')} mitigated: {_how_far(hazards)}",
         tuple(claims) or tuple(view.hazard.id for view in bare),
-        tuple(remedies),
+        steps(remedies),
     )
 
 

@@ -72,7 +72,7 @@ def state_of(case: Case) -> State:
         | {("hazard", h.hazard.id): h.closure for h in case.hazards},
         {name: span for name, span in spans.items() if span is not None},
         {view.id: frozenset(path for r in view.records for path in r.inputs) for view in views},
-        {_evidence_name(item.entry.evidence): _ended(item, view) for view, item in every if not item.counts},
+        {_evidence_name(item.entry.evidence): ended(item, view) for view, item in every if not item.counts},
     )
 
 
@@ -234,7 +234,7 @@ def _formula(requirement: RequirementView, views: Sequence[ObligationView]) -> s
     return "; ".join(sorted(own - {""})) or requirement.formal
 
 
-def _ended(item: EvidenceView, view: ObligationView) -> str:
+def ended(item: EvidenceView, view: ObligationView) -> str:
     """Why a record does not count."""
     if item.currency is Currency.STALE and item.entry.evidence.obligation_digest != view.obligation.digest:
         return "the claim means something else now"

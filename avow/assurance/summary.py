@@ -8,6 +8,7 @@ from dataclasses import replace
 from avow.assurance.facts import Facts
 from avow.assurance.model import Currency, DerivationView, Handled, ObligationView, OpenItem, RequirementView
 from avow.assurance.naming import derivation_claim, requirement_claim, short
+from avow.assurance.state import ended
 from avow.base.plain import count, listed
 from avow.base.verdict import Object
 from avow.evidence.record import CASE, Evidence
@@ -203,7 +204,8 @@ def decisive(view: ObligationView) -> str:
         return f"{record.method}: {record.summary}"
     if view.evidence:
         record = view.evidence[-1].entry.evidence
-        return f"was {record.verdict} by {record.method} on {record.started[:10]}; what it rests on has changed since"
+        why = ended(view.evidence[-1], view)
+        return f"was {record.verdict} by {record.method} on {record.started[:10]}; {why}"
     return "no method is planned for it" if not view.planned else "its methods have not run"
 
 

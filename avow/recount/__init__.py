@@ -65,7 +65,7 @@ def _wrong(block: Block, facts: Facts, letters: list[str]) -> list[str]:
         for quote in letters:
             if quote in text:
                 text = re.sub(rf"(?<![\w.]){re.escape(quote)}(?!\w)", _DONE, text)
-    return found + [f"{block.section}: “{near}”: no rule recomputes this number" for near in _near(text)]
+    return found + [f"{block.section}: “{near}”: report.json gives no such number" for near in _near(text)]
 
 
 def _near(text: str) -> list[str]:

@@ -50,7 +50,7 @@ def show_obligation(case: Case, view: ObligationView, console: Console | None = 
     at = f"{place}, " if place else ""
     out.print(f"[dim]{escape(at)}meaning {o.digest[:12]}, criticality {escape(view.criticality)}[/]")
     if view.below:
-        out.print(f"rests on what fails: {escape(', '.join(map(short, view.below)))}")
+        out.print(f"rests on what is not shown: {escape(', '.join(map(short, view.below)))}")
     for e in view.records:
         vacuous = " (vacuous: supports nothing)" if e.vacuous else ""
         tool = escape(f"({e.tool_told}, tie {e.link})")

@@ -91,7 +91,12 @@ def outcome(obligation: Obligation, claim: Claim, frame: Frame) -> Outcome:
         _summary(claim, counted, own, attached, verdict, frame),
         counterexample,
         hypotheses,
-        {**frame.bound, "properties": len(counted), "indices": list(claim.indices)},
+        {
+            **frame.bound,
+            "properties": len(counted),
+            "indices": list(claim.indices),
+            "nothing_shown_for": [p.about or p.key for p in hollow],
+        },
         details,
         Link.MAPPED,
         vacuous=verdict is Verdict.CHECKED and len(hollow) == len(own),

@@ -41,7 +41,7 @@ from avow.assurance.case import as_of, conclude_again
 from avow.assurance.changes import KINDS, _edit
 from avow.assurance.deficits import _WORDS
 from avow.assurance.deficits import words_of as deficit_words
-from avow.assurance.first_screen import WARNED, _lines, _owners
+from avow.assurance.first_screen import _lines, _owners
 from avow.assurance.model import Case
 from avow.assurance.relied import relied_of, weakness
 from avow.assurance.state import baseline_of
@@ -170,7 +170,7 @@ def test_the_verdict_counts_what_it_speaks_of_and_follows_from_what_the_case_hol
             assert a.tone is Tone.RED
             assert found.exit_code != 0 or not all(r.level.holds for r in found.requirements)
         case Level.EXAMINED:
-            assert a.tone is (Tone.AMBER if a.warned.startswith(WARNED) else Tone.GREY)
+            assert a.tone is (Tone.AMBER if a.warned else Tone.GREY)
         case level:  # the least of what the requirements are
             assert found.exit_code == 0
             assert level.holds
@@ -511,7 +511,7 @@ def test_each_tool_with_an_answer_that_counts_is_to_be_trusted_and_a_refuted_con
     found = case(system({"a": ["g", "h", "k"]}), [*claims, contract], made).answers
     (line,) = (line for line in found.trusted if line.what == "tools whose answers have no certificate")
     assert all(f"{record.tool_told}: 1" in line.which for record in made)  # also one that refutes
-    assert found.based_on[0].words.endswith("; contract refuted")
+    assert found.based_on[0].words.endswith("; a check of its contract fails")
 
 
 def test_which_assumptions_there_are_and_who_answers_for_them_is_said_in_a_line() -> None:
@@ -654,8 +654,10 @@ def test_requirements_on_another_guarantee_of_the_weakest_node_are_counted_besid
     alone = case(system({"a": ["g"]}, requirements=asked[:1]), node[:1], made[:1]).answers.weakest
     assert alone is not None
     assert alone.others == ""
-    lost = case(system({"a": ["g", "h"]}, requirements=asked, hazards=[danger]), node, made[1:]).hazards[0]
-    assert lost.stands == "not shown (weakest: a.g, missing)"
+    lost = case(system({"a": ["g", "h"]}, requirements=asked, hazards=[danger]), node, made[1:])
+    assert lost.hazards[0].stands == "not shown (weakest: a.g, missing)"
+    steps = {gate.id: gate.suggestions[0] for gate in lost.gates if not gate.passed}
+    assert steps["hazards"] == steps["guarantees-medium"], "one remedy for one claim"
 
 
 def test_a_test_of_too_few_cases_is_no_second_method() -> None:
@@ -719,4 +721,4 @@ def test_hazards_and_gates_that_changed_since_the_signature_have_a_line_each() -
     found = lines(subject(PROSE, hazards=[replace(fire, severity="marginal")], policy="reproduction"), first)
     assert ("demand", "hazard H1, severity: critical → marginal") in found
     assert ("gone", "hazard H2 is not there any more") in found
-    assert any(kind == "demand" and words.endswith("passes → not asked any more") for kind, words in found)
+    assert any(kind == "demand" and words.endswith("passes → does not apply any more") for kind, words in found)

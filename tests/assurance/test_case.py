@@ -60,6 +60,9 @@ def test_evidence_of_another_meaning_is_stale_and_kept_as_history() -> None:
     assert [item.currency for item in view.evidence] == [Currency.STALE]
     assert view.counting == ()
     assert not found.good
+    (item,) = [item for item in found.open_items if item.kind == "stale"]
+    assert item.text == "was proved by hoare on 2026-11-21; the claim means something else now"
+    assert item.suggestion.startswith("run `avow verify")
 
 
 def test_the_same_key_but_another_digest_does_not_count() -> None:
@@ -71,6 +74,7 @@ def test_a_withdrawn_method_does_not_count() -> None:
     found = case(SYSTEM, [G], [evidence(G)], keys={})
     assert status_of(found) is Status.STALE
     assert found.obligations[0].evidence[0].currency is Currency.WITHDRAWN
+    assert found.open_items[0].text.endswith("; the plan no longer uses the method for this claim")
 
 
 def test_a_newer_pass_does_not_hide_an_older_refutation_of_the_same_question() -> None:

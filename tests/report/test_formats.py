@@ -326,7 +326,7 @@ def test_the_matrix_page_counts_what_is_covered() -> None:
 
 
 def test_the_grade_of_the_proofs_is_told_as_one_of_proofs() -> None:
-    """Beside WARNED, or a refutation, a bare word would read as a verdict."""
+    """Beside a finding, or a refutation, a bare word would read as a verdict."""
     found = replace(rover_case(), grade=Grade.CERTIFIED)
     for name, text in dict(every_text(found)).items():
         assert "CERTIFIED" not in str(text), name
@@ -352,13 +352,13 @@ def test_the_index_does_not_call_known_bad_material_passed() -> None:
     assert "None is relied upon" in text, "of a system without requirements nothing is claimed either"
     assert text.count("Examined, not relied upon") == 2
     assert examined.answers.verdict == "Examined, not relied upon", "one of four sentences"
-    assert text.count("WARNED: 1 finding known") == 1
+    assert text.count("1 finding against it, which the plan lists") == 1
     made = dict(every_text(examined))
     for name in ("index.html", "report.md", "comment.md", "gsn.yaml"):
-        assert "WARNED: 1 finding known" in str(made[name]), name
-    assert any("WARNED: 1 finding known" in line for line in terminal_lines(examined))
+        assert "1 finding against it, which the plan lists" in str(made[name]), name
+    assert any("1 finding against it, which the plan lists" in line for line in terminal_lines(examined))
     assert (examined.answers.tone, good.answers.tone) == (Tone.RED, Tone.GREY)
-    assert examined.answers.gates.endswith(" not asked of known-bad material")
+    assert examined.answers.gates.endswith(" do not apply")
     assert "✔" not in text.split("<main")[0]
     relied = case(system({"n": ["g"]}, requirements=[Requirement("R", "t", None, None, ("n.g",))]), [g], [evidence(g)])
     assert "1 system, argued; 1 only examined" in render_index([examined, relied])
