@@ -310,16 +310,19 @@ def _with_reasons(
     found: Sequence[ChangeLine], edits: Sequence[tuple[set[str], ChangeLine]], old: State, new: State
 ) -> list[ChangeLine]:
     """Each change of a requirement, a hazard or a claim with the edits and the changes below it that may be the
-    reason. A claim's evidence has a line of its own only if the claim's status did not move."""
+    reason. A claim's evidence has a line of its own only if the claim's status did not move, and a requirement's claim
+    only if the requirement did not move."""
     moved = {c.subject for c in found if c.about == "claim" and c.kind != "meaning"}
+    asked = {c.subject for c in found if c.about == "requirement" and c.before in _LEVELS and c.after in _LEVELS}
+    told = {name for name in moved if name.partition("/requirement/")[2] in asked}
     kept: list[ChangeLine] = []
     evidence: dict[str, list[str]] = {}
     for change in found:
         claim = change.subject.rpartition(" ")[0]
-        if change.about == "evidence" and (claim in moved or change.kind == "rerun"):
+        if change.about == "evidence" and (claim in moved - told or (change.kind == "rerun") != (claim in told)):
             evidence.setdefault(claim, []).append(change.words)
-        if change.about != "evidence" or claim not in moved:
-            kept.append(change)
+        hidden = change.subject in told if change.about == "claim" else change.about == "evidence" and claim in moved
+        kept += [] if hidden else [change]
     result = []
     for change in kept:
         if change.about in (*_FIRST, "claim") and change.kind in ("open", "weaker", "meaning", "better"):
@@ -329,7 +332,7 @@ def _with_reasons(
                 others = [c for c in kept if c.about == "claim" and c.subject in reached - {change.subject}]
                 own += [c.words for c in others if c.kind == "meaning"]
                 own += [f"{path} changed" for path in _changed_files(old, new, reached)]
-                own += evidence.get(change.subject, [])
+                own += [words for name in sorted(told & reached | {change.subject}) for words in evidence.get(name, [])]
                 own += [c.words for c in others if c.kind != "meaning"]
             change = replace(change, edits=tuple(own))
         result.append(change)

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from assurance.sample import case, evidence, guarantee, keys_of, rover_parts, system
+from assurance.sample import case, evidence, guarantee, keys_of, obligation, rover_parts, system
 from click import UsageError
 from click.testing import CliRunner
 
@@ -23,6 +23,7 @@ from avow.base.diagnostics import Rejected, Span
 from avow.base.files import sha256
 from avow.base.verdict import Object, Verdict
 from avow.cli.diff import command as diff
+from avow.evidence.obligation import Kind
 from avow.evidence.record import Evidence
 from avow.report import render_all
 from avow.report.comparison import render_comparison
@@ -179,6 +180,23 @@ def test_a_change_names_the_edits_that_concern_it(after: State, told: dict[str, 
     assert all((path, int(line)) == (FILE, n) for path, _, line in lines for n in told.values())
     if "H" in told:
         assert "proved → refuted: “n meets h”" in named["H"]
+
+
+def test_a_requirement_that_moved_has_one_line_with_its_own_evidence() -> None:
+    """Its claim's status, which counts a person's reasons below, would be another word for the same."""
+    own = obligation("system", Kind.REQUIREMENT, "F")
+    asked = Requirement("F", "It is so.", "n.x > 0", None, ())
+
+    def state(verdict: Verdict) -> State:
+        return state_of(case(system({"n": []}, requirements=[asked]), [own], [evidence(own, verdict, "compose")]))
+
+    found = [c for c in compare(state(Verdict.PROVED), state(Verdict.REFUTED)) if c.about in ("requirement", "claim")]
+    assert [(c.words, c.edits) for c in found] == [
+        (
+            "F was shown of models, and is refuted",
+            ("system/requirement/F by compose: proved (model) → refuted (model)",),
+        )
+    ]
 
 
 def test_requirements_that_came_and_went_and_how_each_stands() -> None:
