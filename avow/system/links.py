@@ -70,11 +70,15 @@ def _promised(node: Node, name: str | None = None) -> Iterator[str]:
 
 
 def _placed(node: Node, plan: Plan) -> Iterator[str]:
-    """A node's ports, and what is connected to its inputs."""
+    """A node's ports with their units and frames, and what is connected to its inputs."""
     for port in (*node.inputs, *node.outputs):
-        yield repr((node.name, port.role.name, port.name + " (parameter)" * port.parameter, show_sort(port.sort)))
+        unit = (port.unit,) if port.unit else ()
+        yield repr(
+            (node.name, port.role.name, port.name + " (parameter)" * port.parameter, show_sort(port.sort), *unit)
+        )
     for topic in node.topics:
-        yield repr((node.name, topic.name, topic.port.variable.qualified if topic.port else ""))
+        frame = (topic.frame,) if topic.frame else ()
+        yield repr((node.name, topic.name, topic.port.variable.qualified if topic.port else "", *frame))
     for edge in plan.connections:
         if edge.target.node == node.name:
             yield repr((str(edge), edge.initial))

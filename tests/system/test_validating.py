@@ -90,6 +90,8 @@ requirements: {R: {text: It is low., %s}}
         (("Most = 5", "Most = 6"), {"formula: b.x <= Most"}),
         (("outputs( x : REAL ) topics()\n  assume", "outputs( x : INTEGER ) topics()\n  assume"),
          {"supported_by: [b.g]", "formula: b.x <= Most"}),
+        (("outputs( x : REAL ) topics()\n  assume", "outputs( x : REAL in m ) topics()\n  assume"),
+         {"supported_by: [b.g]", "formula: b.x <= Most"}),
         (("guarantee any ( out.x <= 9 )", "guarantee any ( out.x <= 8 )"), set()),
         (("node c", "// another node\nnode c"), set()),
     ],
