@@ -79,6 +79,7 @@ def relied_upon(view: ObligationView, opinion: Opinion, views: Iterable[Obligati
             outdone,
             not all(t.owned for t in thought),
             -status.rank,
+            -(upper_bound(record) or 0.0) if status in SAMPLED else 0.0,  # the requirement's rate counts the worst
             agrees(views, view.obligation, record.method) is None,
             len(way.assumptions),
             record.method,
