@@ -250,6 +250,11 @@ def _says(facts: Facts, match: re.Match[str], block: Block) -> _Numbers:
     return (fits[0]["number"][1:] if fits else "none with these words",)
 
 
+def _place(facts: Facts, match: re.Match[str], _block: Block) -> _Numbers:
+    """Where the plan's words for an assumption belong."""
+    return match.groups() if any(a["key"].startswith(f"{match[1]}:") for a in facts.assumptions) else ("no such place",)
+
+
 def _beside(facts: Facts, _match: re.Match[str], _block: Block) -> _Numbers:
     """Requirements with their weakest evidence in another guarantee of the node that has the weakest of all."""
     claim = facts.case["answers"]["weakest"]["claim"]
@@ -320,12 +325,14 @@ _BOUND = r"(?:, with no bound on failures| \([^()]*: at most [\d.]+ %(?: of (?:c
 _SEEN = r"[Oo]bserved \d+ times?(?: on \d+ recorded runs?)?, none against it"
 _SEEN += rf"|(?:[Oo]nly )?\d+ of \d+ cases? met its condition, none failed{_BOUND}|\d+ cases?, none failed{_BOUND}"
 _SEEN += r"|searched to step \d+, not exhaustively"
-_SEEN += rf"|\d+ (?:triggered )?runs?(?: of \d+)?, \d+ failed(?:; the worst stratum: [^()]*)?{_BOUND}"
+_SEEN += rf"|\d+ (?:triggered )?runs?(?: of \d+)?, \d+ failed(?:; the worst stratum: [^()]*[^() ])?{_BOUND}"
 
 _WHY = r"fails\. (.*?)(?:; and (\d+) more)?(?=\.? Next:|\.? $)"
 _DAY = r"(\d{4}-\d\d-\d\d)"
 
 RULES = (
+    _rule("head", _WHY, _reasons),  # first: a reason is compared as a whole, with the numbers in it
+    _rule("gates", _WHY, _reasons),
     _rule("signature", r"^ (By signing .*) $", lambda f, m, _: m.groups() if m[1] == f.signed() else None),
     _rule("q5", r"^ (.*) $", lambda f, m, _: m.groups() if m[1] in [e["words"] for e in f.changes] else None),
     _rule("changes", r"^ ␟([^␟]*)␟([^␟]*)␟([^␟]*)␟([^␟]*)$", _change),
@@ -367,6 +374,7 @@ RULES = (
     _rule("q4", rf"assumed since {_DAY}(?: to {_DAY})?", _days),
     _rule("q4", rf"(?:until|the first ends) {_DAY}", _days),
     _rule("q4", r"\bA(\d+)(?= )", _says),
+    _rule("q4", r"under (assumptions\.[\w-]+)\.WORD", _place),
     _rule("q5", r" all (\d+)(?= $)", _whole(lambda f: len(f.changes))),
     _rule("q5", r"^ (\d+) more(?:, (\d+) of them better)? $", _rest),
     _rule("q5", r"re-run: (\d+) guarantees?, same answer", _whole(lambda f: f.case["changes"]["again"])),
@@ -398,8 +406,6 @@ RULES = (
         "signature", r"the digest ([0-9a-f]+)…", lambda _f, m, _b: m.groups()
     ),  # `avow sign` and the audit compute it
     _rule("head", r"(\d+) answers? from earlier runs", _whole(Facts.old)),
-    _rule("head", _WHY, _reasons),
-    _rule("gates", _WHY, _reasons),
     _rule("head", r"SHA-(256)", lambda _f, m, _b: m.groups()),
     # a digest, or its first characters, may be digits only
     _rule("head", r"git HEAD (\d+)(?=,)", lambda f, _m, _b: (str(f.case["run"].get("revision")),)),

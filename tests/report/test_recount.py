@@ -43,6 +43,21 @@ def with_a_rate() -> Case:
     return three(sampled("a.g"), sampled("b.g", "0.049", 60), sampled("c.g"))
 
 
+def limited() -> Case:
+    """A requirement whose rate is above the policy's limit: the gate's reason has the rate in it."""
+    samples = (sampled("a.g"), sampled("b.g", "0.049", 60), sampled("c.g"))
+    return three(*samples, policy={"max_failure_rate": {"medium": 0.01}})
+
+
+def stratified() -> Case:
+    """A second experiment, with strata and an assumption of its own without words."""
+    target = guarantee("n", "g")
+    bound = {"runs": 40, "failures": 0, "worst stratum": "floor = dry, 0 of 20 failed"}
+    bound |= {"failure probability at most": 0.1392, "confidence": 0.95}
+    record = evidence(target, Verdict.TESTED, "experiment-2", bound=bound, hypotheses=("runs are independent",))
+    return make_case(system({"n": ["g"]}), [target], [record])
+
+
 def examined() -> Case:
     """A refutation that the plan expects, with a counterexample to be cut; gates that are not asked."""
     target = guarantee("n", "g")
@@ -81,6 +96,8 @@ def mixed() -> Case:
 
 CASES: dict[str, Callable[[], Case]] = {
     "rate": with_a_rate,
+    "limited": limited,
+    "stratified": stratified,
     "examined": examined,
     "weakened": weakened,
     "mixed": mixed,
@@ -208,7 +225,7 @@ def test_each_kind_of_deficit_is_recounted() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["rover", "large", "rate", "examined"])
+@pytest.mark.parametrize("name", ["rover", "large", "rate", "limited", "stratified", "examined"])
 def test_any_changed_number_is_found(name: str) -> None:
     page, data = made(name)
     seeded = list(changed(page))
