@@ -85,12 +85,18 @@ def held(
         supposes=tuple(s.key for s in mine),
         rate=rate,
         searched=next((seen(r) for n in view.obligations if (r := relied.get(n)) and r.status is Status.TESTED), ""),
-        answer=_with_level(view, level, rate, weakest, awaits=awaits),
+        answer=_with_level(view, level, rate, weakest, len(mine), awaits=awaits),
     )
 
 
 def _with_level(
-    view: RequirementView, level: Level, rate: RateView | None, weakest: WeakestEvidence | None, *, awaits: bool
+    view: RequirementView,
+    level: Level,
+    rate: RateView | None,
+    weakest: WeakestEvidence | None,
+    assumed: int,
+    *,
+    awaits: bool,
 ) -> str:
     if not view.status.supports:
         return view.answer
@@ -99,7 +105,7 @@ def _with_level(
         f"The weakest evidence below it: {weakest.brief}." if weakest else "",
         view.answer,
     ]
-    parts.append(f"F{rate.words[1:]}." if rate else "")
+    parts += [f"It needs {count(assumed, 'assumption')}." if assumed else "", f"F{rate.words[1:]}." if rate else ""]
     return " ".join(part for part in parts if part)
 
 
@@ -153,9 +159,7 @@ def _answer(
         return f"Refused: it would support itself ({' → '.join(short(name) for name in standing.circle)})."
     if standing.status.supports:
         name, status = standing.weakest
-        told = f"Assumed for a person's reason: {short(name)}. " if status is Status.JUSTIFIED else ""
-        hypotheses = len(standing.hypotheses)
-        return told + (f"It rests on {count(hypotheses, 'hypothesis', 'hypotheses')}." if hypotheses else "").strip()
+        return f"Assumed for a person's reason: {short(name)}." if status is Status.JUSTIFIED else ""
     if standing.direct and standing.status is not Status.MISSING:
         own = [name for name in own_obligations if name in standing.below]
         where = ", ".join(short(name) for name in own or standing.below) or "its evidence"

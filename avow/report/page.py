@@ -173,6 +173,7 @@ def render_details(case: Case) -> Iterator[tuple[str, str]]:
     shared = {
         "pages": pages,
         "full": _in_full([view for views in nodes.values() for view in views]),
+        "numbered": wording.numbered(case),
         "places": source.places(case),
         "remarked": _by_item([item for item in case.open_items if item.kind == REMARK]),
     }

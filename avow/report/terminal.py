@@ -18,6 +18,7 @@ from avow.report.wording import (
     history,
     in_lines,
     mutation,
+    numbered,
     outline,
     rerun,
     tone,
@@ -61,7 +62,8 @@ def show_obligation(case: Case, view: ObligationView, console: Console | None = 
         if e.bound:
             out.print(f"  [dim]within: {escape(bound_text(e.bound))}[/]")
         for hypothesis in in_words(e.rests_on, e.hypotheses):
-            out.print(f"  on the hypothesis: {escape(hypothesis)}")
+            number = numbered(case).get(hypothesis, "")
+            out.print(f"  on the hypothesis{f' {number}' if number else ''}: {escape(hypothesis)}")
         if e.counterexample:
             _show_counterexample(e.counterexample, out)
         if outline(e):

@@ -224,6 +224,11 @@ def _parts(text: str, kind: str) -> list[str]:
     return [*parts, text[start:]]
 
 
+def numbered(case: Case) -> dict[str, str]:
+    """The number of the assumption that has a record's hypothesis."""
+    return {text: s.number for s in case.assumptions for text in s.text.split("\n")}
+
+
 def bound_text(bound: Mapping[str, Any]) -> str:
     """``cases 2000, seed 0``; for a state space ``every state explored, for each i in 0…12, 25 properties``."""
     return ", ".join(_one_bound(name, value) for name, value in bound.items() if value not in ([], (), {}, ""))

@@ -276,6 +276,7 @@ def test_what_evidence_supposes_is_told_whether_or_not_a_requirement_needs_it(re
     assert finite.key in {w for kind in found.deficits if kind.key == "unowned" for w in kind.claims}
     assert "it rests on no assumptions" not in found.answers.statement
     assert not counts(found, both(found))
+    assert f">{finite.number}</a> inputs are finite" in claim_pages(found)["node-a.html"]
     page = " ".join(both(found).split())
     assert "inputs are finite" in page
     assert "guarantees only" in page
