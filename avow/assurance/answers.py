@@ -79,9 +79,9 @@ class Level(StrEnum):
 
 MEANINGS = {
     Level.SHOWN: "everything below is proved, or checked exhaustively, of the running program",
-    Level.MODELS: "something below is proved or checked of a model, or of the wiring, only; the program may differ",
+    Level.MODELS: "something below is of a model, or of the wiring, only; the program may differ",
     Level.TESTS: "something below is sampled: tests, recordings or measurements",
-    Level.TESTED_MODELS: "something below is sampled, and something is of a model only; the program may differ",
+    Level.TESTED_MODELS: "something below is sampled, and something of a model only; the program may differ",
     Level.ARGUED: "a person vouches for the sentence or for a guarantee below",
     Level.NOT_SHOWN: "evidence is missing or stale, it is not validated, or a claim below is not shown or refuted",
     Level.REFUTED: "there is a counterexample",

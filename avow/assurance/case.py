@@ -61,7 +61,7 @@ from avow.assurance.model import (
 from avow.assurance.naming import derivation_claim, sanity_property, short
 from avow.assurance.relied import relied_upon
 from avow.assurance.remarks import remarks
-from avow.assurance.requirement_views import held, requirement_view
+from avow.assurance.requirement_views import failing_of, held, requirement_view
 from avow.assurance.risk_gates import standard_gate
 from avow.assurance.standards import standard_view
 from avow.assurance.summary import open_items
@@ -163,7 +163,8 @@ def conclude(facts: Facts) -> Case:
     weakened = deficits(views, requirements, supposed, listed, findings, relied, single, hazards, missing_tools(facts))
     basis = {n for c in closed.values() for n in c.claims} if closed else set(whole.claims)
     basis |= {n for h in hazards for n in h.closure}
-    weakest = weakest_of(basis, by_id, relied, titles)
+    lost = sorted({n for c in closed.values() for n in c.failing} | {n for h in hazards for n in h.failing})
+    weakest = failing_of((), lost, by_id, titles) or weakest_of(basis, by_id, relied, titles)
     following = weakest_of(basis - {weakest.claim}, by_id, relied, titles) if weakest else None
     if weakest is not None:
         needing = tuple(r.id for r in requirements if weakest.claim in r.closure)

@@ -263,7 +263,7 @@ def _programs(
     guarantees = [v for v in obligations if v.obligation.kind is Kind.GUARANTEE and v.id in relied]
     of_models = {v.obligation.node for v in guarantees if looked_at(relied[v.id]) is Object.MODEL}
     asked = [v for v in own if v.obligation.name != ProgramClaim.LINKED or v.obligation.node in of_models]
-    title = "Programs run without fault, and answer as the models that they were compared with"
+    title = "Programs run without fault, and agree with their models"
     yield _held_to(Kind.PROGRAM.value, title, asked, facts.policy.programs, excused)
 
 

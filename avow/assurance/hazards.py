@@ -36,6 +36,8 @@ class HazardView:
     tone: Tone
     closure: tuple[str, ...] = field(default=(), metadata=LATER)
     """Every obligation that its mitigations rest on."""
+    failing: tuple[str, ...] = field(default=(), metadata=LATER)
+    """Those of them that do not hold."""
     weakest_evidence: WeakestEvidence | None = field(default=None, metadata=LATER)
     """The weakest of everything beneath it; of a hazard that is not mitigated, the claim that fails."""
 

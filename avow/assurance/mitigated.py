@@ -88,7 +88,8 @@ def hazard_views(
         if not level.holds:
             claims = [claim for m, _, _ in items for claim in m.claims]
             weakest = failing_of(claims, below.failing, views, titles)
-        found.append(HazardView(hazard, tuple(m for m, _, _ in items), level, tone, below.claims, weakest))
+        named = tuple(m for m, _, _ in items)
+        found.append(HazardView(hazard, named, level, tone, below.claims, below.failing, weakest))
     return tuple(found)
 
 

@@ -29,7 +29,7 @@ def hazards_gate(hazards: Sequence[HazardView], views: Mapping[str, ObligationVi
     open_ones = [view for view in hazards if view.mitigations and not view.level.holds]
     reasons = [f"{listed([view.hazard.id for view in bare])}: no mitigation"] if bare else []
     reasons += [f"{view.hazard.id}: {view.stands}" for view in open_ones]
-    failing = [view for h in open_ones for name in h.closure if not (view := views[name]).standing.supports]
+    failing = [views[name] for h in open_ones for name in h.failing if name in views]
     remedies = [view.suggestion for view in failing if view.suggestion]
     if bare:
         where = f"in {bare[0].hazard.span.file}" if bare[0].hazard.span else "with the hazard"

@@ -55,8 +55,8 @@ def trust_lines(
         (tool, many), *others = sorted(tools.items())
         names = listed([f"{tool}: {count(many, 'answer')}", *(f"{tool}: {many}" for tool, many in others)], 5)
         shown = sum(v.obligation.kind is Kind.GUARANTEE and v.status.supports for v in views)
-        again = f"no other program checks these answers; {shown - single} of {count(shown, 'guarantee')} that hold"
-        second = f"{again} ha{'s' if shown == 1 else 've'} a second, independent method"
+        again = f"nothing checks these answers; {shown - single} of {count(shown, 'guarantee')} that hold"
+        second = f"{again} ha{'s' if shown == 1 else 've'} a second method"
         lines.append(TrustLine("tools whose answers have no certificate", names, second, True))
     bare = [a for a in assumptions if not a.owned]
     if bare:

@@ -350,7 +350,8 @@ RULES = (
     _rule("q6", r"and (\d+) more kinds?", _whole(lambda f: _kinds(f) - KINDS_SHOWN)),
     _rule(
         "head",
-        r"policy: (\d+) of (\d+) gates? pass(?:es)?(?:, (\d+) relaxed by the plan)?(?:, (\d+) do(?:es)? not apply)?",
+        r"policy: (\d+) of (\d+) gates? pass(?:es)?(?:, (\d+) relaxed by the plan(?: \([^()␟]*\))?)?"
+        r"(?:, (\d+) do(?:es)? not apply)?",
         _gates,
     ),
     _rule("head", rf"(\d+) ({_LEVELS})(?= [·␟]|, | $)", _level),

@@ -617,7 +617,8 @@ def test_what_was_seen_has_one_wording(verdict: Verdict, method: str, bound: dic
         subject(PROSE), [*GUARANTEES], [evidence(GUARANTEES[0], verdict, method, bound=bound, details=details)]
     )
     assert found.answers.weakest is not None
-    assert found.answers.weakest.words == told
+    assert found.answers.weakest.words == "missing", "of the other guarantees: what fails comes before all evidence"
+    assert found.answers.next_weakest.endswith(f": {told}")
 
 
 def test_requirements_on_another_guarantee_of_the_weakest_node_are_counted_beside_it() -> None:
