@@ -8,8 +8,8 @@ rclcpp's ``parameter_map_from``.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
-from typing import Any
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any, TypeVar
 
 OF_EVERY_NODE = ("use_sim_time", "qos_overrides", "start_type_description_service")
 """First parts of the names of parameters that every node of ROS 2 has."""
@@ -18,6 +18,9 @@ SLIP = SECTION.replace("__", "_")
 
 Path = tuple[str, ...]
 """Keys of mappings within mappings."""
+At = TypeVar("At")
+EVERY = "/**"
+"""The entry of parameters that are set without a node's name, as `-p` does."""
 
 
 class WrongParameters(Exception):  # noqa: N818 - it is what was found wrong
@@ -34,37 +37,51 @@ def is_sectioned(data: object) -> bool:
     return any(key in (SECTION, SLIP) or str(key)[:1] == "/" or is_sectioned(value) for key, value in keys)
 
 
-def of_node(data: Mapping[str, Any], name: str) -> dict[str, Any]:
-    """The parameters that a file sets for the node of a whole name, by their dotted names; a later entry takes
-    precedence over an earlier one. Raises WrongParameters."""
-    return {key: value for key, (value, _) in placed(data, name).items()}
-
-
 def placed(data: Mapping[str, Any], name: str) -> dict[str, tuple[Any, Path]]:
-    """The same with the keys that lead to each value; of a plain mapping, all of it."""
+    """The parameters that a file sets for the node of a whole name, by their dotted names, with the keys that lead to
+    each value; of a plain mapping, all of it. Raises WrongParameters."""
     if not is_sectioned(data):
         return {".".join(map(str, path)): (value, path) for path, value in _leaves(data, ())}
-    found: dict[str, tuple[Any, Path]] = {}
+    found, doubts = settled(entries(data, name))
+    for key, why in doubts.items():
+        raise WrongParameters(why, found[key][1])
+    return found
+
+
+def entries(data: Mapping[str, Any], name: str) -> Iterator[tuple[str, str, Any, Path]]:
+    """What a file sets for a node: the entry's name, the parameter's dotted name, its value, and the keys that lead to
+    it. Raises WrongParameters."""
+    every = list(_entries(data, "", ()))
+    for entry, section, above in every:
+        for path, value in _leaves(section, above) if _matches(entry, name) else ():
+            yield entry, ".".join(map(str, path[len(above) :])), value, path
+    if not any(_matches(entry, name) for entry, _, _ in every):
+        others = ", ".join(entry for entry, _, _ in every)
+        raise WrongParameters(f"it sets nothing for {name}, but for {others}", every[0][2][:-1] if every else ())
+
+
+def settled(given: Iterable[tuple[str, str, Any, At]]) -> tuple[dict[str, tuple[Any, At]], dict[str, str]]:
+    """Parameters by their names, each with its value and a place; and why some values are not clear. All that is given
+    under one entry is one section (rcl), the sections count in the order in which they first appear (rclcpp and
+    rclpy), except that in older versions of rclpy a wildcard never replaces what is given for the node itself."""
+    sections: dict[str, dict[str, tuple[Any, At]]] = {}
+    for entry, key, value, at in given:
+        sections.setdefault(entry, {})[key] = value, at
+    found: dict[str, tuple[Any, At]] = {}
     own: dict[str, str] = {}
-    entries = list(_entries(data, "", ()))
-    for entry, section, above in entries:
-        if not _matches(entry, name):
-            continue
-        for path, value in _leaves(section, above):
-            key = ".".join(map(str, path[len(above) :]))
+    doubts: dict[str, str] = {}
+    for entry, section in sections.items():
+        for key, (value, at) in section.items():
             if "*" in entry and key in own and found[key][0] != value:
-                raise WrongParameters(
+                doubts[key] = (
                     f"{entry} sets {key} to {value!r} after {own[key]} has set it to {found[key][0]!r}, and client "
-                    "libraries do not agree which of them counts: put the wildcard first",
-                    path,
+                    "libraries do not agree which of them counts: put the wildcard first"
                 )
             if "*" not in entry:
                 own[key] = entry
-            found[key] = value, path
-    if not any(_matches(entry, name) for entry, _, _ in entries):
-        others = ", ".join(entry for entry, _, _ in entries)
-        raise WrongParameters(f"it sets nothing for {name}, but for {others}", entries[0][2][:-1] if entries else ())
-    return found
+                doubts.pop(key, None)
+            found[key] = value, at
+    return found, doubts
 
 
 def flat(section: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:

@@ -23,7 +23,7 @@ from avow.language.contract import Contract, Node
 from avow.ros.launch import Launched, Setting, Started, read_launch
 from avow.ros.launch.elements import HINT
 from avow.ros.names import Placed, Resolver
-from avow.ros.parameters import OF_EVERY_NODE, WrongParameters, flat, is_sectioned, of_node
+from avow.ros.parameters import EVERY, OF_EVERY_NODE, WrongParameters, entries, flat, is_sectioned, settled
 from avow.ros.quality import BAG_FILE
 from avow.system.node_plan import parameter_place, parameters
 from avow.system.plan import Plan, System
@@ -137,11 +137,11 @@ def _parameters(plan: Plan, node: Node, launched: Started) -> Iterator[Diagnosti
 
 def started_with(launched: Started) -> tuple[dict[str, tuple[Any, Span]], tuple[Diagnostic, ...]]:
     """The parameters that a launch file certainly sets for a node, and those that it sets but that are not read."""
-    there: dict[str, tuple[Any, Span]] = {}
+    given: list[tuple[str, str, Any, Span]] = []
     unread: list[Diagnostic] = []
     for setting in launched.parameters:
         try:
-            there |= {name: (value, setting.span) for name, value in _set(setting, launched.name)}
+            given += _set(setting, launched.name)
         except (OSError, ValueError, yaml.YAMLError, WrongParameters) as error:
             what = setting.name or os.path.normpath(setting.value or "a file")
             why, near = str(error), None
@@ -152,26 +152,40 @@ def started_with(launched: Started) -> tuple[dict[str, tuple[Any, Span]], tuple[
             message = f"{launched.name} is started with the parameters of {what}, which are not read: {why}"
             if setting.name:
                 message = f"{launched.name} is started with the parameter {what}, which is not read: {why}"
-                there.pop(what, None)
+                given = [one for one in given if one[1] != what]
             else:
-                there.clear()  # it may set any of them
+                given = []  # it may set any of them
             hint = near or "see to it yourself that the plan's `source: {parameters: …}` has the same"
             unread.append(Diagnostic("ROS121", message, setting.span, Severity.WARNING, hint))
+    there, doubts = settled(given)
+    for name, why in doubts.items():
+        message = f"{launched.name} is started with the parameter {name}, whose value is not clear: {why}"
+        unread.append(Diagnostic("ROS121", message, there.pop(name)[1], Severity.WARNING))
     return there, tuple(unread)
 
 
-def _set(setting: Setting, node: str) -> Iterator[tuple[str, Any]]:
-    """The parameters that a launch file's parameter, or file of parameters, sets. Raises OSError, ValueError, YAMLError
-    and WrongParameters."""
+def _set(setting: Setting, node: str) -> list[tuple[str, str, Any, Span]]:
+    """The parameters that a launch file's parameter, or file of parameters, sets, each under an entry
+    (`avow.ros.parameters.settled`). Raises OSError, ValueError, YAMLError and WrongParameters."""
+    entry = EVERY if setting.unnamed else node
     if not setting.value:
         raise ValueError("its value is known only when it is launched")
     if setting.name:
-        yield setting.name, yaml.safe_load(setting.value)
-    elif not Path(setting.value).is_absolute():
+        return [(entry, setting.name, yaml.safe_load(setting.value), setting.span)]
+    if not Path(setting.value).is_absolute():
         raise ValueError("a relative path depends on the folder in which `ros2 launch` runs")
-    else:
-        data = yaml.safe_load(read_regular(Path(setting.value)))
-        yield from (of_node(data, node) if is_sectioned(data) else dict(flat(data or {}))).items()
+    data = yaml.safe_load(read_regular(Path(setting.value)))
+    if data is None:
+        return []
+    if not isinstance(data, dict):
+        raise ValueError("it is no mapping")
+    if is_sectioned(data) and not setting.within:
+        return [(at, name, value, setting.span) for at, name, value, _ in entries(data, node)]
+    found = ((name, value) for name, value in flat(data))
+    if setting.within:
+        whole = ((f"{setting.within.rstrip('/')}/{name.replace('.', '/')}", value) for name, value in found)
+        found = ((n[len(node) + 1 :].replace("/", "."), v) for n, v in whole if n.startswith(f"{node}/"))
+    return [(entry, name, value, setting.span) for name, value in found]
 
 
 def told(system: System) -> Iterator[Diagnostic]:

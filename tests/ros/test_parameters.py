@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import pytest
 import yaml
 
-from avow.ros.parameters import WrongParameters, flat, is_sectioned, nested, of_node
+from avow.ros.parameters import WrongParameters, flat, is_sectioned, nested, placed
 
 P = "ros__parameters"
+
+
+def of_node(data: dict[str, Any], name: str) -> dict[str, Any]:
+    return {key: value for key, (value, _) in placed(data, name).items()}
 
 
 @pytest.mark.parametrize(

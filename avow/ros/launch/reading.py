@@ -168,10 +168,21 @@ class _Reading:
             case "arg" | "let":
                 self.arg(element, scope, started)
             case "set_parameter":
-                scope.settings += (replace(self.setting(element, scope, started), shared=True),)
+                scope.settings += (replace(self.setting(element, scope, started), shared=True, unnamed=True),)
+            case "param" if scope.ros1 and str(element.get("name")).startswith("~"):  # of all nodes that follow here
+                set_ = self.setting(element, scope, started)
+                scope.settings += (replace(set_, name=set_.name[1:], shared=True),)
             case "param" if scope.ros1 and not scope.lost:
                 set_ = self.setting(element, scope, started)
                 self.server.append((len(self.nodes), replace(set_, name=_within(scope.namespace, set_.name))))
+            case "rosparam" if scope.ros1 and self.shown(element.get("command"), scope) != "dump":
+                at = scope.namespace
+                for key in ("ns", "param"):
+                    at = _within(at, self.shown(element.get(key), scope))
+                rest = {key: text for key, text in element.attributes.items() if key not in ("ns", "param")}
+                set_ = self.setting(replace(element, attributes=rest), scope, started)
+                set_ = replace(set_, value="", within="/") if scope.lost else replace(set_, within=at or "/")
+                self.server.append((len(self.nodes), set_))
             case tag if tag in _SILENT:
                 pass
             case tag:
@@ -303,7 +314,11 @@ class _Reading:
                 self.tell(element, f"the node's name is not known: {why}")
         parts = [self.shown(element.get(key), scope) for key in ("pkg", "exec", "type", "plugin")]
         kind = "/".join(part for part in parts if part)
-        settings = (*(Setting(*one, element.span) for one in given), *scope.settings, *self.settings(element, scope))
+        own_settings = self.settings(element, scope)
+        if not scope.ros1 and element.get("name") is None:
+            own_settings = (replace(each, unnamed=True) for each in own_settings)
+        words = (Setting(*one, element.span, unnamed=not scope.ros1) for one in given)
+        settings = (*words, *scope.settings, *own_settings)
         self.nodes.append(Started(whole, kind, tuple(remaps), tuple(dict.fromkeys(doubt)), element.span, settings))
         if element.tag.endswith("container"):
             self.each((e for e in element.children if e.tag == "composable_node"), outer)
@@ -317,13 +332,24 @@ class _Reading:
     def setting(self, element: Element, scope: _Scope, holds: bool | str) -> Setting:
         name = self.shown(element.get("name"), scope)
         value = self.shown(element.get("from", "file", "value"), scope)
-        file = "from" in element.attributes or element.attributes.keys() == {"file"}
+        file = "from" in element.attributes or self.is_loaded(element, scope)
         return Setting(name, value if holds is True and (name or file) else "", element.span)
+
+    def is_loaded(self, element: Element, scope: _Scope) -> bool:
+        """ROS 1: whether parameters come from a file as it stands, not from the element's text or a substitution."""
+        loads = self.shown(element.get("command"), scope) in ("", "load")
+        return loads and "file" in element.attributes and not {"subst_value", "ns", "param"} & element.attributes.keys()
 
     def with_server(self, place: int, node: Started) -> Started:
         """ROS 1: with the parameters that elements outside of the node set for it. The last one of a name holds."""
         prefix = f"{node.name}/"
-        own = [(k, replace(s, name=s.name[len(prefix) :])) for k, s in self.server if s.name.startswith(prefix)]
+        own = []
+        for k, setting in self.server:
+            within = f"{setting.within.rstrip('/')}/"
+            if setting.within and (within.startswith(prefix) or prefix.startswith(within)):
+                own.append((k, setting))
+            elif setting.name.startswith(prefix):
+                own.append((k, replace(setting, name=setting.name[len(prefix) :])))
         before, after = ([s for k, s in own if (k > place) is late] for late in (False, True))
         return replace(node, parameters=(*before, *node.parameters, *after)) if node.name and own else node
 

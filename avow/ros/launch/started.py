@@ -34,6 +34,10 @@ class Setting:
     span: Span = field(compare=False, repr=False)
     shared: bool = False
     """Whether it is set for all nodes of a scope, which need not have such a parameter."""
+    unnamed: bool = False
+    """ROS 2: whether it is given without the node's name, as a wildcard is (`avow.ros.parameters.settled`)."""
+    within: str = ""
+    """ROS 1: the namespace in which the file's mapping is loaded; empty: the node's own."""
 
 
 @dataclass(frozen=True, slots=True)
