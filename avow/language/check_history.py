@@ -40,7 +40,7 @@ class Histories(Terms):
             hint = f"units of time are {', '.join((*UNITS, *LONG_UNITS))}; steps are counted in a limit only"
             self.error("RCL320", f"`{tree.unit.text}` is no unit of time", tree.unit, hint=hint)
             return None
-        return Literal(Fraction(tree.digits) * scale, REAL, self.span(tree))
+        return Literal(Fraction(tree.digits) * scale, REAL, self.span(tree), "s")
 
     def limited(self, tree: syntax.Limited) -> Term | None:
         return self.history(tree, Past(tree.name.text), tree.arguments, tree.limit)

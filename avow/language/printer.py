@@ -274,6 +274,8 @@ class _Printer:
             return quote(value), ATOM
         fraction = Fraction(value)
         text, level = show_number(fraction)
+        if term.unit and level == ATOM and self.name == "rcl":
+            return f"{text} {term.unit}", ATOM
         if term.sort == s.REAL and fraction.denominator == 1 and not real:
             text += ".0"
         return text, level

@@ -126,6 +126,8 @@ class Literal(_Node):
     value: bool | int | Fraction | str
     sort: Sort
     span: Span | None = field(default=None, compare=False, repr=False)
+    unit: str = field(default="", compare=False, repr=False)
+    """The unit that is written with it (``2 s``), as base unit."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,7 +1,8 @@
 """Units of measurement of ports (REP 103), and of the terms of formulas.
 
-A number in a formula has the unit that its place wants. A port without a unit, a bound variable, and what a function, a
-sequence or a field gives may have any. Source: https://www.ros.org/reps/rep-0103.html.
+A number in a formula has the unit that its place wants, unless it is written with one (`2 s`). A port without a unit, a
+bound variable, and what a function, a sequence or a field gives may have any. Source:
+https://www.ros.org/reps/rep-0103.html.
 """
 
 from __future__ import annotations
@@ -85,6 +86,8 @@ class _Reader:
             case t.Variable() if term.role is not t.Role.BOUND:
                 text = self.unit_of(term)
                 return unit(text) if text else None
+            case t.Literal(unit=text) if text:
+                return unit(text)
             case t.Arithmetic(operator="*" | "/" as sign, left=left, right=right):
                 factors = [
                     NUMBER if _is_number(side) else part for side, part in zip((left, right), parts, strict=True)
@@ -121,8 +124,10 @@ class _Reader:
 
 
 def _is_number(term: t.Term) -> bool:
-    """Whether a term has no variables: its unit is that of its place."""
-    return isinstance(term, t.Literal) or (bool(term.children) and all(map(_is_number, term.children)))
+    """Whether a term has no variables and no unit of its own: its unit is that of its place."""
+    return (isinstance(term, t.Literal) and not term.unit) or (
+        bool(term.children) and all(map(_is_number, term.children))
+    )
 
 
 def _product(one: _Found, other: _Found, sign: str) -> _Found:

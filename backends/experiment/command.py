@@ -180,7 +180,8 @@ class _Work:
     def text(self) -> Iterator[str]:
         node = self.job.node.name
         for name, outcome in self.outcomes().items():
-            yield f"{node}.{name}: {outcome.verdict.value}: {outcome.summary}"
+            word = "vacuous" if outcome.vacuous else outcome.verdict.value
+            yield f"{node}.{name}: {word}: {outcome.summary}"
         if self.made and (worst := min(self.made, key=_distance)).distances:
             yield f"nearest to a breach: {_line(worst)}"
         if self.searched is not None:

@@ -74,7 +74,7 @@ class Claim:
 class Judged:
     """The result of a trial. `met`: the indices of the conditions that were met; `asked`: the guarantee demanded
     something; `broken`: the step that violates it; `open`: it ends before an answer is due; `excused`: an assumption
-    did not hold, before any violation; `undecided`: the name of what could not be decided."""
+    did not hold, before any violation; `undecided`: why it could not be decided."""
 
     met: frozenset[int] = frozenset()
     asked: bool = False
@@ -127,14 +127,16 @@ def judged(claim: Claim, steps: Sequence[Step]) -> Judged:
         assumed = {formula.name: formula.holds(values) for formula in claim.assumptions}
         if False in assumed.values():
             return Judged(frozenset(met), excused=True)
-        doubt = doubt or next((f"assumption {name}" for name, holds in assumed.items() if holds is None), "")
+        doubt = doubt or next(
+            (f"assumption {name} has no value" for name, holds in assumed.items() if holds is None), ""
+        )
         if _demanded(claim, values):
             asked = True
             met |= {n for n, condition in enumerate(claim.conditions) if condition.holds(values) is True}
         held = claim.holds.holds(values)
         if held is False:
             return Judged(frozenset(met), True, broken=at, undecided=doubt)
-        undecided = undecided or (claim.holds.name if held is None else "")
+        undecided = undecided or (f"{claim.holds.name} has no value" if held is None else "")
         waits = claim.waits is not None and claim.waits.holds(values) is not False
         keeper.advance(ports)
     return Judged(frozenset(met), asked, open=waits, undecided=doubt or undecided)

@@ -75,7 +75,7 @@ def _outcome(claim: Claim, found: Sequence[tuple[Run, Judged]], experiment: Expe
         return _failed(replace(outcome, summary=seen), claim, sample.failed)
     if undecided := [(run, one) for run, one in found if one.undecided and not one.excused]:
         run, one = undecided[0]
-        return replace(outcome, summary=f"run {run.name}: nobody can tell whether {one.undecided} holds")
+        return replace(outcome, summary=f"run {run.name} is undecided: {one.undecided}")
     if why := _unmet(claim, found):
         return replace(outcome, verdict=Verdict.TESTED, vacuous=True, summary=why)
     asked = experiment.at_least or experiment.floor

@@ -7,19 +7,20 @@ import random
 import time
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from fractions import Fraction
 from typing import Any
 
 from avow.backend_kit.given import file_path
 from avow.backend_kit.programs.judging import Formula
 from avow.backend_kit.protocol import Job, Limits
 from avow.base.files import sha256
-from avow.base.plain import count, listed
+from avow.base.plain import count, decimal, listed
 from avow.base.tuning.effort import JUDGE_EFFORT
 from avow.base.verdict import Counterexample, Hypothesis, HypothesisKind, Outcome, Verdict
 from avow.evidence.obligation import Obligation
 from avow.evidence.record import CASE
 from avow.formulas.conditions import conditions
-from avow.formulas.values import show
+from avow.formulas.values import Binary, show
 from avow.language.contract import Clause
 from avow.language.terms import FALSE, Term
 from avow.solving.questions import solve
@@ -143,7 +144,13 @@ class _Work:
         ports = self.runtime.ports(self.job.node, point)
         if ports is None or not all(each.holds(ports) is True for each in allowed) or holds.holds(ports) is not False:
             return False
-        shown = tuple((name, show(value)) for name, value in ports.items())
+        # digits of a float32 are shown unless the guarantee holds of what they say
+        rounded = {n: Fraction(v.digits) if isinstance(v, Binary) else v for n, v in ports.items()}
+        exact = holds.holds(rounded) is not False
+        shown = tuple(
+            (n, (decimal(Fraction(v)) if exact and isinstance(v, Binary) else None) or show(v))
+            for n, v in ports.items()
+        )
         found.broken = Counterexample(shown, f"guarantee {holds.name} does not hold of the network in onnxruntime")
         found.point = point
         return True

@@ -193,7 +193,7 @@ def _contradictions(record: Record, piece: Piece) -> Iterator[Diagnostic]:
     place = top["conclusion"].span
     if why := unreadable(record.reviewer):
         hint = "write the name in the letters of one script"
-        yield Diagnostic("REV124", f"nobody can tell this reviewer's name: {why}", top["reviewer"].span, hint=hint)
+        yield Diagnostic("REV124", f"the reviewer's name is not readable: {why}", top["reviewer"].span, hint=hint)
     days = {"date": wrong_day(record.date)}
     if record.valid_until:
         days["valid_until"] = wrong_day(record.valid_until, past=False)

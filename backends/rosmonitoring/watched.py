@@ -49,7 +49,7 @@ class Tally:
     partial: int = 0
     """Answers that were never complete, and whose parts alone do not decide them."""
     supposed: int = 0
-    """Answers that held by an initial value of the plan, before any message: neither for nor against."""
+    """Answers that held before any message of a variable, as with its initial value: neither for nor against."""
     forgotten: int = 0
     """Steps not decided, since steps before them were not seen."""
     overdue: int = 0
@@ -137,7 +137,7 @@ def coverage(tally: Tally) -> str:
         (tally.partial, "part of an incomplete answer {}"),
         (tally.forgotten, "undecided, since earlier steps were not seen {}"),
         (tally.unanswered, "unanswered inputs {}"),
-        (tally.supposed, "held by the plan's initial value, before any message {}"),
+        (tally.supposed, "held before any message of a variable {}"),
     ]
     told = ", ".join(words.format(count) for count, words in parts if count)
     told += f"; {old(tally.ages)}" if tally.ages else ""

@@ -30,6 +30,7 @@ NODE = """node n {{
         "f * d / t > 5 and i + t > 3",
         "x < previous(d, 0) and max(abs(x), 2 * r) > min(d, 3)",
         "exists(z in REAL | z > x and z > y)",
+        "t > 2 s and x < v * 3 s and k > 1 h",
         "x in {d, 3} and far(2 * d) and x == (if y > 3 then r else 0)",
         "x * x == d * r",
         "within[2 s](x > d)",
@@ -56,6 +57,8 @@ def test_formulas_of_one_unit(formula: str) -> None:
         ("far(t)", "m s"),
         ("once[2 s](x > i)", "m s"),
         ("0 <= x <= y", "m m/s"),
+        ("x > 2 s", "m s"),
+        ("x < w * 3 s + 1 min", "rad s"),
         ("not (mod(i, 2) == x)", "s m"),
     ],
 )

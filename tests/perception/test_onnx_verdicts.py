@@ -97,6 +97,16 @@ node detector {{
 ONE_OPTIONS: dict[str, Any] = {"inputs": {"in.x": 0}, "outputs": {"out.z": 0}}
 
 
+@pytest.mark.parametrize(
+    ("formula", "shown"), [("out.z < 1/20", "0.1"), ("10 * out.z <= 1", "0.100000001490116119384765625")]
+)
+def test_a_counterexample_is_one_as_it_is_shown(formula: str, shown: str, tmp_path: Path) -> None:
+    found = judged(tmp_path, formula, network(([[0.0]], [0.1])), ONE, **ONE_OPTIONS)
+    assert found.verdict is Verdict.REFUTED
+    assert found.counterexample is not None
+    assert dict(found.counterexample.values)["out.z"] == shown
+
+
 @pytest.mark.parametrize("width", [2.0, 0.001])
 def test_a_blind_spot_is_found_and_named(width: float, tmp_path: Path) -> None:
     """1 everywhere but about 5: no drawn point falls into the narrow one."""

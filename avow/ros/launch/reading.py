@@ -22,7 +22,7 @@ from avow.base.tuning.sizes import LAUNCH_BYTES, LAUNCH_DEPTH, LAUNCH_ELEMENTS, 
 from avow.ros.launch.elements import HINT, Element, Parsed, Text, Unread, WrongLaunch, place, unread
 from avow.ros.launch.overrides import overrides
 from avow.ros.launch.python import from_python
-from avow.ros.launch.started import Launched, Setting, Started
+from avow.ros.launch.started import Launched, Setting, Started, with_server
 from avow.ros.names import is_name
 
 
@@ -32,7 +32,7 @@ def read_launch(files: Iterable[tuple[Path, Mapping[str, str]]], root: Path) -> 
     work = _Reading(root.resolve())
     for path, given in files:
         work.file(path.resolve(), dict(given), None)
-    nodes = tuple(work.with_server(k, node) for k, node in enumerate(work.nodes))
+    nodes = tuple(with_server(node, k, work.server) for k, node in enumerate(work.nodes))
     return Launched(nodes, tuple(dict.fromkeys(work.unread)), tuple(work.files))
 
 
@@ -339,19 +339,6 @@ class _Reading:
         """ROS 1: whether parameters come from a file as it stands, not from the element's text or a substitution."""
         loads = self.shown(element.get("command"), scope) in ("", "load")
         return loads and "file" in element.attributes and not {"subst_value", "ns", "param"} & element.attributes.keys()
-
-    def with_server(self, place: int, node: Started) -> Started:
-        """ROS 1: with the parameters that elements outside of the node set for it. The last one of a name holds."""
-        prefix = f"{node.name}/"
-        own = []
-        for k, setting in self.server:
-            within = f"{setting.within.rstrip('/')}/"
-            if setting.within and (within.startswith(prefix) or prefix.startswith(within)):
-                own.append((k, setting))
-            elif setting.name.startswith(prefix):
-                own.append((k, replace(setting, name=setting.name[len(prefix) :])))
-        before, after = ([s for k, s in own if (k > place) is late] for late in (False, True))
-        return replace(node, parameters=(*before, *node.parameters, *after)) if node.name and own else node
 
     def command_line(
         self, element: Element, scope: _Scope, doubt: list[str], given: list[tuple[str, str]]

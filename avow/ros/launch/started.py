@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import field
+from collections.abc import Iterable
+from dataclasses import field, replace
 from pathlib import Path
 
 from avow.base.diagnostics import Diagnostic, Span
@@ -53,3 +54,18 @@ class Launched:
     def is_broken(self) -> bool:
         """Whether a file is missing or no launch file, so that nothing follows from what the others start."""
         return any(found.is_error for found in self.unread)
+
+
+def with_server(node: Started, place: int, server: Iterable[tuple[int, Setting]]) -> Started:
+    """ROS 1: a node, before which `place` nodes come, with the parameters that elements outside of nodes set for it,
+    each with the number of nodes that come before it. The last one of a name holds."""
+    prefix = f"{node.name}/"
+    own = []
+    for k, setting in server if node.name else ():
+        within = f"{setting.within.rstrip('/')}/"
+        if setting.within and (within.startswith(prefix) or prefix.startswith(within)):
+            own.append((k, setting))
+        elif setting.name.startswith(prefix):
+            own.append((k, replace(setting, name=setting.name[len(prefix) :])))
+    before, after = ([s for k, s in own if (k > place) is late] for late in (False, True))
+    return replace(node, parameters=(*before, *node.parameters, *after)) if own else node
