@@ -7,6 +7,8 @@ runs.
 from __future__ import annotations
 
 import json
+import re
+import sys
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -16,7 +18,7 @@ from avow import __version__
 from avow.backend_kit.protocol import Report
 from avow.base.codec import Unreadable, from_text
 from avow.base.files import is_intact, read_regular
-from avow.base.plain import one_line
+from avow.base.plain import listed, one_line
 from avow.base.verdict import Outcome, Verdict
 from avow.base.workspace import Workspace
 from avow.calculus.entailment import KeptAnswers
@@ -31,6 +33,7 @@ from avow.pipeline.requests import Request, Response
 from avow.pipeline.run_info import Run
 from avow.pipeline.work import COMPOSE, Work, engine_identity
 
+_ENVIRONMENT = re.compile(rb"\b(environb?|getenvb?)\b")
 CHANGED = "contract, plan or a model changed while it was being verified; run it again"
 
 
@@ -60,7 +63,7 @@ def settle(
     report = judged(work, obligations, response)
     others = unlike_here(report.observed, workspace.root)
     if not others:
-        return report
+        return _with_environment(report, workspace.root)
     worker = one_line(response.worker)[:64]
     if work.planned is not None and tool_identities(work.planned[0]) != work.tools:
         return _undeclared(report, others, worker)
@@ -84,8 +87,21 @@ def _here(workspace: Workspace, work: Work, obligations: tuple[Obligation, ...],
         response = run.processes.run(request, workspace.root)
     except OSError as error:
         response = Response("", failure=f"{type(error).__name__}: {error}")
-    report = judged(work, obligations, response)
+    report = _with_environment(judged(work, obligations, response), workspace.root)
     return replace(report, outcomes=tuple(_rerun(outcome, report.observed) for outcome in report.outcomes))
+
+
+def _with_environment(report: Report, root: Path) -> Report:
+    """The report, resting on the assumption that the robot sets no environment variable that a Python file of the
+    workspace reads: a program under test gets none of them."""
+    read = {root / o.path for o in report.observed if o.kind is Seen.READ and o.path.endswith(".py")}
+    own = sorted(path for path in read if path.is_relative_to(root) and not path.is_relative_to(sys.prefix))
+    asks = [p.relative_to(root).as_posix() for p in own if p.is_file() and _ENVIRONMENT.search(read_regular(p))]
+    if not asks:
+        return report
+    text = f"the robot sets no environment variable that {listed(asks, 3)} reads: in tests none is set"
+    outcomes = (replace(o, hypotheses=(*o.hypotheses, text)) if o.verdict.supports else o for o in report.outcomes)
+    return replace(report, outcomes=tuple(outcomes))
 
 
 def _lacking(work: Work, run: Run) -> tuple[str, ...]:

@@ -207,6 +207,23 @@ def test_what_cannot_be_recorded_is_said(tmp_path: Path, name: str) -> None:
     assert any(what.startswith(f"{name} (") for what in outside(tmp_path, UNRECORDABLE[name]))
 
 
+@pytest.mark.parametrize(
+    ("text", "told"), [("import os\nx = os.getenv('X', 1)\n", True), ("import os\nx = os.getpid\n", False)]
+)
+def test_variables_of_the_environment_are_an_assumption(tmp_path: Path, text: str, told: bool) -> None:
+    folder = tmp_path / "contracts" / "robot"
+    (folder / "models").mkdir(parents=True)
+    files = {"robot.rcl": RCL, "plan.yaml": PLAN, "models/part.py": text}
+    files["models/limiter.py"] = "import part\ndef step(wish): return min(wish, 10)\n"
+    for name, content in files.items():
+        (folder / name).write_text(content)
+    (outcome,) = discharge(Workspace(tmp_path), method(folder), Run("first", False))
+    assert outcome.verdict is Verdict.TESTED
+    assert [*outcome.hypotheses] == [
+        "the robot sets no environment variable that contracts/robot/models/part.py reads: in tests none is set"
+    ] * told
+
+
 @pytest.mark.parametrize("network", [False, True])
 def test_an_answer_that_rests_on_it_counts_and_is_re_run_in_every_run(tmp_path: Path, network: bool) -> None:
     folder = tmp_path / "contracts" / "robot"
