@@ -88,8 +88,8 @@ class Job:
     kept: Mapping[str, Sequence[Any]] = field(default_factory=dict)
     """Obligation's id → cases that refuted it once, as this backend put them under `record.CASE` into an outcome's
     details. A backend that stores cases tries them first, with any options."""
-    further: tuple[Further, ...] = ()
-    """For a method that judges recorded data: the other claims that these may contradict."""
+    further: tuple[Further, ...] | None = None
+    """For a method that judges recorded data (`Backend.compares`): the other claims that these may contradict."""
 
     @property
     def every(self) -> tuple[Obligation, ...]:
@@ -346,8 +346,8 @@ class Backend(ABC):
     """Whether an answer may depend on topics, connections or other nodes; likewise. For a callback class it always may
     (`wired`)."""
     uses_upstream: bool = False
-    """Whether an answer may depend on the contracts of all nodes upstream, and on the same backend's options for them.
-    With False the job has no clause of another node."""
+    """Whether an answer may depend on the contracts of all nodes upstream (of all nodes at all where it `compares`),
+    and on the same backend's options for them. With False the job has no clause of another node."""
     remembers: bool = False
     """Whether it judges clauses about other steps (`avow.formulas.temporal`), or does not read formulas at all. Other
     backends never see such a clause: the guarantee is refused by name."""
@@ -401,6 +401,10 @@ class Backend(ABC):
         """Whether a backend that `remembers` itself answers what it cannot express in this job: `unsaid` is then not
         called."""
         return False
+
+    def compares(self, job: Job) -> bool:
+        """Whether recorded data are compared with `job.further`, too: not if another node's method does it."""
+        return self.of is Object.RECORDING
 
     def opens(self, job: Job) -> Opens:
         """How it treats parameters. See `avow.backend_kit.one_step`."""

@@ -110,7 +110,7 @@ def surroundings(tool: Backend, job: Job, options: str, files: Iterable[Path] | 
         parts.append(["source", *texts, *kind, sorted(declared.memory.items())])
         parts += [repr(sorted(declared.values.items()))] if declared.values else []
         parts += sorted([clause.name, digest(clause.formula)] for clause in job.begins)
-    if job.further:
+    if job.further is not None:
         parts.append(sorted([f.node, f.claim, digest(f.clause.formula), f.at_least, *f.supports] for f in job.further))
     if tool.uses_criticality:
         parts.append(["criticality", job.system.plan.node(job.node.name).criticality])
@@ -156,8 +156,16 @@ def _wiring(system: System, node: Node, backends: Collection[str]) -> list[Any]:
 
 
 def upstream_of(tool: Backend, job: Job) -> frozenset[str]:
-    """The nodes whose contracts the method may look at."""
-    return frozenset(node.name for node in job.contract.nodes if sees_all(tool, job.method))
+    """The nodes whose contracts the method may look at: any, where recordings are compared with all claims. Else those
+    whose data reach its node, and none where that assumes nothing."""
+    if not sees_all(tool, job.method) or (job.further is None and not job.node.assumptions):
+        return frozenset()
+    if job.further is not None:
+        return frozenset(node.name for node in job.contract.nodes)
+    try:
+        return dataflow(job.system).upstream(job.node.name)
+    except Rejected:  # told elsewhere
+        return frozenset()
 
 
 def _upstream_node(job: Job, name: str, backends: Collection[str]) -> list[Any]:

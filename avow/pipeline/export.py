@@ -73,7 +73,7 @@ def generated(work: Work) -> Mapping[str, str]:
     assert isinstance(cut, MethodSlice)
     assert work.planned is not None
     method = cut.system.plan.node(cut.node).methods[0]
-    job = method_job(cut.system, cut.system.contract.node(cut.node), method, work.planned[0], cut.further)
+    job = method_job(cut.system, cut.system.contract.node(cut.node), method, work.planned[0], cut)
     return one_step.export(work.planned[0], job)
 
 

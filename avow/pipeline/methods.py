@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING
 
 from avow.backend_kit.further import Further, guarantees, of_plan
 from avow.backend_kit.linked import models, sees_all, unrun
@@ -12,12 +14,14 @@ from avow.backend_kit.registry import backend, names
 from avow.base.files import sha256
 from avow.base.remembered import by_identity
 from avow.base.tools import package_digest, program_digest
-from avow.base.verdict import Object
 from avow.evidence.obligation import Kind, Obligation, ProgramClaim
 from avow.formulas.formula import digest, node_digest, sort_digest
 from avow.language.contract import Node
 from avow.language.definitions import show_clause
 from avow.system.plan import Method, System
+
+if TYPE_CHECKING:
+    from avow.pipeline.slices import MethodSlice
 
 Offered = Mapping[str, tuple[str, str]] | None
 """With a remote executor: tool → version and program's digest there."""
@@ -46,25 +50,25 @@ def method_job(
     node: Node,
     method: Method,
     tool: Backend | None = None,
-    further: tuple[Further, ...] | None = None,
+    cut: MethodSlice | None = None,
 ) -> Job:
-    """`tool` is the method's backend, if given: a backend under test need not be installed. `further`: in a slice, the
-    job's."""
+    """`tool` is the method's backend, if given: a backend under test need not be installed. `cut`: the job's slice, if
+    it is made from one."""
     tool = tool or method_backend(system, method)
     names = [c for c in tool.claims if _can_be_claimed(system, node, c)]
     claims = tuple(_program_claim(system, node, name) for name in names)
     obligations = tuple(guarantee(system, node, name) for name in method.guarantees)
-    return Job(system, node, method, obligations, claims, further=_further(system, node, method, tool, further))
+    job = Job(system, node, method, obligations, claims)
+    return replace(job, further=_further(tool, job) if cut is None else cut.further)
 
 
-def _further(
-    system: System, node: Node, method: Method, tool: Backend, given: tuple[Further, ...] | None
-) -> tuple[Further, ...]:
+def _further(tool: Backend, job: Job) -> tuple[Further, ...] | None:
     """The other claims that a method's data may contradict: of recordings of any node, else of its own."""
-    if given is not None or tool.of is not Object.RECORDING:
-        return given or ()
-    planned = (each for each in of_plan(system) if sees_all(tool, method) or each.node == node.name)
-    return (*guarantees(system, node, method.guarantees), *planned)
+    if not tool.compares(job):
+        return None
+    system, node = job.system, job.node
+    planned = (each for each in of_plan(system) if sees_all(tool, job.method) or each.node == node.name)
+    return (*guarantees(system, node, job.method.guarantees), *planned)
 
 
 def _can_be_claimed(system: System, node: Node, name: ProgramClaim) -> bool:

@@ -51,7 +51,7 @@ class MethodSlice:
     system: System
     node: str
     method: str
-    further: tuple[Further, ...] = ()
+    further: tuple[Further, ...] | None = None
 
 
 Slice = SanitySlice | ComposeSlice | MethodSlice
@@ -125,7 +125,8 @@ def method_slice(
     )
     told = named.definitions(contract.definitions)
     cut_contract = Contract((), named.types(contract), named.constants(contract), nodes, told)
-    return MethodSlice(System(cut, cut_contract), job.node.name, job.method.id, tuple(map(_bare_further, job.further)))
+    further = None if job.further is None else tuple(map(_bare_further, job.further))
+    return MethodSlice(System(cut, cut_contract), job.node.name, job.method.id, further)
 
 
 def _own(job: Job, named: Named, upstream: Collection[str], sentences: bool) -> Node:

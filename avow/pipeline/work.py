@@ -13,7 +13,7 @@ from dataclasses import field, replace
 from pathlib import Path
 from typing import Any
 
-from avow.backend_kit.further import Further, assumption
+from avow.backend_kit.further import assumption
 from avow.backend_kit.linked import beside
 from avow.backend_kit.protocol import Backend, Job, Limits
 from avow.base.diagnostics import Severity
@@ -33,7 +33,7 @@ from avow.pipeline.engine_code import backend_digest, engine_digest
 from avow.pipeline.evidence_keys import method_options, surroundings
 from avow.pipeline.methods import Offered, guarantee, is_portable, method_backend, method_job, tool_identities
 from avow.pipeline.settings import asked_seconds
-from avow.pipeline.slices import SanitySlice, Slice, compose_slice, method_slice, sanity_slice
+from avow.pipeline.slices import MethodSlice, SanitySlice, Slice, compose_slice, method_slice, sanity_slice
 from avow.sanity.claims import claims, node_key, recall
 from avow.system.plan import Method, System
 
@@ -173,12 +173,12 @@ def _method_works(system: System, offered: Offered = None) -> tuple[Work, ...]:
 
 
 def method_work(
-    system: System, node: Node, method: Method, offered: Offered = None, further: tuple[Further, ...] | None = None
+    system: System, node: Node, method: Method, offered: Offered = None, cut: MethodSlice | None = None
 ) -> Work:
-    """`offered`: the tools of the machines that jobs are sent to, if any. `further`: in a slice, the job's."""
+    """`offered`: the tools of the machines that jobs are sent to, if any. `cut`: as for `method_job`."""
 
     tool = method_backend(system, method)
-    job = method_job(system, node, method, tool, further)
+    job = method_job(system, node, method, tool, cut)
     options = method.options.data if isinstance(method.options.data, Mapping) else {}
     told = method_options(method)
     tools = tool_identities(tool, offered)

@@ -139,7 +139,7 @@ def _method_work(cut: MethodSlice) -> Work:
     planned = [m for m in cut.system.plan.node(cut.node).methods if m.id == cut.method]
     if not planned:
         raise Refused("the work came without its method")
-    return method_work(cut.system, cut.system.contract.node(cut.node), planned[0], further=cut.further)
+    return method_work(cut.system, cut.system.contract.node(cut.node), planned[0], cut=cut)
 
 
 def _shown(tools: Tools) -> str:

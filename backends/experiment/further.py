@@ -28,7 +28,7 @@ def contradictions(job: Job, experiment: Experiment) -> Iterator[Outcome]:
     named = job.options.get("outside", {})
     apart = {v.name for c in job.node.assumptions if c.name in named for v in ports_of(c.formula)}
     apart |= {key.removeprefix("in.") for key in named}
-    planned = [f for f in job.further if f.clause.kind is ClauseKind.ASSUMPTION]
+    planned = [f for f in job.further or () if f.clause.kind is ClauseKind.ASSUMPTION]
     assumed = [*((assumption(job.node.name, c.name), c) for c in job.node.assumptions)]
     assumed += [(f.claim, f.clause) for f in planned]
 
@@ -44,7 +44,7 @@ def contradictions(job: Job, experiment: Experiment) -> Iterator[Outcome]:
             shown = replace(counterexample(one, broken), explanation=f"run {broken[0][0].name} breaks it")
             yield contradicted(name, f"{len(broken)} of {len(runs)} runs break the assumption {clause.name}", shown)
     excused = tuple(f.clause for f in planned if apart & {v.name for v in ports_of(f.clause.formula)})
-    others = [f for f in job.further if f.clause.kind is ClauseKind.GUARANTEE]
+    others = [f for f in job.further or () if f.clause.kind is ClauseKind.GUARANTEE]
     own = {f.clause.name: f.clause for f in others if f.at_least} | {o.name: job.clause(o) for o in job.obligations}
     known_own = {name: one for name, clause in own.items() if (one := ready(clause, job.node.assumptions)) is not None}
     failing = {
@@ -75,7 +75,7 @@ def of_campaign(job: Job, campaign: Campaign, experiment: Experiment) -> Iterato
                 about = (("run", row.run.name), *row.cells.items(), *shown.values)
                 shown = replace(shown, values=about)
             broken.setdefault(outcome.obligation, {})[row.run.name] = replace(outcome, counterexample=shown)
-    further = {f.claim: f for f in job.further}
+    further = {f.claim: f for f in job.further or ()}
     runs = (*experiment.runs, *(experiment.replayed or ()))
     failing = {o.name: {r.name for r in runs if r.verdicts[o.name].broken is not None} for o in job.obligations}
     for name, found in broken.items():
@@ -97,6 +97,6 @@ def _claimed(other: Further) -> Fraction | None:
 def _rated(job: Job, experiment: Experiment, other: Further, failing: Mapping[str, Collection[str]]) -> set[str]:
     """The runs that a claimed rate covers: in them, a requirement is broken together with a guarantee that the plan
     names as its support, whose failures the requirement's rate counts."""
-    rates = {f.clause.name for f in job.further if f.at_least}
+    rates = {f.clause.name for f in job.further or () if f.at_least}
     rates |= {o.name for o in job.obligations if experiment.at_least is not None}
     return {run for name in rates.intersection(other.supports) for run in failing.get(name, ())}

@@ -106,6 +106,11 @@ class RosMonitoringBackend(Backend):
                 problems.append(Diagnostic("MON103", message, span, Severity.WARNING))
         return tuple(problems)
 
+    def compares(self, job: Job) -> bool:
+        from .further import leads
+
+        return any(leads(job, name) for name in _traces(job))
+
     def files(self, job: Job) -> tuple[Path, ...]:
         found: list[Path] = []
         for name in (*_traces(job), *(entry["data"] for entry in job.options.get("overhead", ()))):

@@ -43,9 +43,9 @@ def contradictions(job: Job, names: Sequence[str], seconds: float) -> tuple[tupl
     claims could be judged."""
     found: dict[str, Outcome] = {}
     doubts: list[str] = []
-    for name in names:
+    for name in names if job.further is not None else ():
         path = inside(job.root, name)
-        if path is not None and _leads(job, name):
+        if path is not None and leads(job, name):
             one = of_job(job, name, path, time.process_time() + seconds)
             found = {each.obligation: each for each in one.refuted()} | found
             doubts += one.doubts.values()
@@ -54,7 +54,8 @@ def contradictions(job: Job, names: Sequence[str], seconds: float) -> tuple[tupl
     return tuple(found.values()), tuple(doubts), ""
 
 
-def _leads(job: Job, name: str) -> bool:
+def leads(job: Job, name: str) -> bool:
+    """Whether no earlier node of the contract names the recording."""
     own = job.node.name
     naming = (n.name for n in job.contract.nodes if n.name == own or name in recordings(method_of(job.system, n.name)))
     return next(naming) == own
@@ -65,9 +66,8 @@ def of_job(job: Job, name: str, path: Path, deadline: float, apart: Mapping[str,
     options = {n.name: method_of(job.system, n.name) for n in job.contract.nodes} | {job.node.name: job.method.options}
     given = {node: outside(own, name) for node, own in options.items()}
     given |= {} if apart is None else {job.node.name: apart}
-    return Recording(
-        job.system, job.further, name, path, deadline, options, given, frozenset(o.local_id for o in job.obligations)
-    )
+    own = frozenset(o.local_id for o in job.obligations)
+    return Recording(job.system, job.further or (), name, path, deadline, options, given, own)
 
 
 @dataclass

@@ -108,6 +108,28 @@ def test_data_refute_what_they_contradict(
     assert refuted(place, folder) == broken
 
 
+def test_an_edit_re_runs_the_recordings_that_it_reaches(place: Workspace) -> None:
+    """The first node that names a recording compares it with all claims; the others depend on what reaches them."""
+    folder = write(place, TRACE, GOOD)
+    apart = "node c { inputs( w : REAL ) outputs( v : REAL ) topics() guarantee k ( out.v == in.w ) }\n"
+    edit(folder / "s.rcl", ("node b", f"{apart}node b"))
+    edit(folder / "plan.yaml", ("methods: []", f"methods: [{TRACE}]"), ("  b:", f"  c: {{methods: [{TRACE}]}}\n  b:"))
+
+    def keys() -> dict[str, str]:
+        found = survey(folder)
+        assert isinstance(found, Survey), found
+        return {work.node: min(work.keys.values()) for work in found.catalogue.works if work.planned is not None}
+
+    def reached(old: str, new: str) -> set[str]:
+        before = keys()
+        edit(folder / "s.rcl", (old, new))
+        return {node for node, key in keys().items() if key != before[node]}
+
+    assert reached("out.z <= in.y + 1", "out.z <= in.y + 2") == {"a", "b"}
+    assert reached("out.v == in.w", "out.v >= in.w") == {"a", "c"}
+    assert reached("out.y <= 10", "out.y <= 9") == {"a", "b"}
+
+
 def test_an_honest_run_refutes_nothing(place: Workspace) -> None:
     rng = random.Random(27)
     for method in (TRACE, TABLE):
