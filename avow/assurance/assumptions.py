@@ -21,6 +21,7 @@ from avow.assurance.naming import short
 from avow.assurance.relied import Judged, Relied, differs, looked_at, relied_of, seen
 from avow.assurance.support import assumption_claim
 from avow.base.records import dataclass
+from avow.base.remembered import by_identity
 from avow.base.verdict import HypothesisKind, Object
 from avow.evidence.obligation import Kind
 from avow.evidence.record import Evidence
@@ -152,8 +153,17 @@ def _one(items: Sequence[_Raw], requirements: Sequence[str], statements: Stateme
 
 
 def _in(closed: Mapping[str, Closed], claim: str) -> Callable[[str], bool]:
-    holders = {name for name, found in closed.items() if claim in found.claims}
-    return holders.__contains__
+    return _holders(closed).get(claim, set()).__contains__
+
+
+@by_identity(1)
+def _holders(closed: Mapping[str, Closed]) -> Mapping[str, set[str]]:
+    """Each claim with the names of all that rests on it."""
+    found: dict[str, set[str]] = {}
+    for name, one in closed.items():
+        for claim in one.claims:
+            found.setdefault(claim, set()).add(name)
+    return found
 
 
 def _reasons(views: Sequence[ObligationView], closed: Mapping[str, Closed], statements: Statements) -> Iterator[_Raw]:

@@ -16,6 +16,7 @@ from avow.assurance.relied import judgements
 from avow.base.graphs import components
 from avow.base.persons import one_person
 from avow.base.plain import count
+from avow.base.remembered import by_identity
 from avow.base.tuning.shown import TOOL_WORDS
 from avow.base.verdict import Isolation, Link, Verdict
 from avow.evidence.obligation import Kind
@@ -281,10 +282,14 @@ def missing_tools(facts: Facts) -> Mapping[tuple[str, str], str]:
 
 
 def _planned(view: ObligationView, facts: Facts) -> Mapping[str, str]:
-    backends = {
-        method: backend for node in facts.nodes if node.name == view.obligation.node for method, backend in node.methods
-    }
+    backends = _backends(facts).get(view.obligation.node, {})
     return {method: backends.get(method, method) for method, _ in view.planned}
+
+
+@by_identity(1)
+def _backends(facts: Facts) -> Mapping[str, Mapping[str, str]]:
+    """Node → method → backend."""
+    return {node.name: dict(node.methods) for node in facts.nodes}
 
 
 def _new_method(view: ObligationView, demand: Demand, used: Mapping[str, str], facts: Facts) -> Suggestion:

@@ -106,8 +106,10 @@ def full_reason(assumption: Assumption) -> str:
     """Everything stated for an assumption beyond its one-line text."""
     parts = [assumption.because] if assumption.because else []
     parts += [text for text in assumption.text.split("\n") if text not in (assumption.because, assumption.says)]
-    told = list(dict.fromkeys(p for p in parts if p and not any(p != q and p in q for q in parts)))
-    return "; ".join(told)
+    longer = ""
+    for part in sorted({*parts}, key=len, reverse=True):  # a search in one text: there is a part for each claim
+        longer += f"\0{part}\0" if part and part not in longer else ""
+    return "; ".join(dict.fromkeys(part for part in parts if part and f"\0{part}\0" in longer))
 
 
 def others(case: Case, line: SupposedLine) -> list[Assumption]:
