@@ -8,6 +8,7 @@ from dataclasses import field
 
 from avow.base.diagnostics import Diagnostic, Severity, Span
 from avow.base.records import dataclass
+from avow.base.suggestions import nearest
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,6 +62,12 @@ def place(file: str, line: int, column: int = 1) -> Span:
 def unread(span: Span, message: str, hint: str = HINT) -> Diagnostic:
     """A diagnostic for a part that is not read, with its place."""
     return Diagnostic("ROS121", message, span, Severity.WARNING, hint)
+
+
+def nameless(element: Element) -> str:
+    """The hint for a node without a name: another attribute may be a misspelt `name`."""
+    near = nearest("name", element.attributes, alike=0.75)
+    return f"did you mean `name` for `{near[0]}`?" if near else HINT
 
 
 def literal(text: str) -> Text:

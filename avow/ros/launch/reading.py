@@ -17,9 +17,8 @@ from pathlib import Path
 from avow.base.diagnostics import Diagnostic
 from avow.base.files import read_regular, read_text
 from avow.base.records import dataclass
-from avow.base.suggestions import nearest
 from avow.base.tuning.sizes import LAUNCH_BYTES, LAUNCH_DEPTH, LAUNCH_ELEMENTS, PACKAGES_SEARCHED
-from avow.ros.launch.elements import HINT, Element, Parsed, Text, Unread, WrongLaunch, place, unread
+from avow.ros.launch.elements import HINT, Element, Parsed, Text, Unread, WrongLaunch, nameless, place, unread
 from avow.ros.launch.overrides import overrides
 from avow.ros.launch.python import from_python
 from avow.ros.launch.started import Launched, Setting, Started, with_server
@@ -306,7 +305,7 @@ class _Reading:
         text = name if name is not None else element.get("name")
         if text is None:
             message = "the node has no name here, and the name that its program gives is not known"
-            self.tell(element, message, _name_it(element))
+            self.tell(element, message, nameless(element))
         elif not scope.lost:
             try:
                 whole = _within(scope.namespace, self.name(text, scope).lstrip("/"))
@@ -444,11 +443,6 @@ class _Reading:
 
     def tell(self, element: Element, message: str, hint: str = HINT) -> None:
         self.unread.append(unread(element.span, message, hint))
-
-
-def _name_it(element: Element) -> str:
-    near = nearest("name", element.attributes, alike=0.75)
-    return f"did you mean `name` for `{near[0]}`?" if near else HINT
 
 
 def _wanted(element: Element, key: str) -> Text:
