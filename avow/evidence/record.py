@@ -54,6 +54,9 @@ AGAINST = "against"
 STANDS_ON = (OBSERVED, ISOLATION, RETRY, "certificate", "mutation", "valid_until")
 """The details by which one of two records with the same statement may count and the other not."""
 
+IN_PART = "nothing_shown_for"
+"""Among the bounds of a record: the parts of the claim for which it shows nothing."""
+
 CASE = "case"
 """Among the details of a refutation: its inputs in the backend's own format, to be tried first on every later run."""
 

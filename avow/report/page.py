@@ -31,6 +31,7 @@ from avow.base.plain import count
 from avow.base.remembered import by_identity
 from avow.base.tuning.shown import FINDING_CHARACTERS, GUARANTEE_ROWS, OBLIGATIONS_IN_FULL, ROWS_UNFOLDED
 from avow.evidence.obligation import SYSTEM_LEVEL, Kind
+from avow.evidence.record import IN_PART
 from avow.evidence.status import Status, weigh
 from avow.report import example, source, wording
 from avow.report.wording import history
@@ -39,7 +40,7 @@ KINDS = (Kind.GUARANTEE, Kind.SANITY, Kind.COMPOSITION, Kind.REQUIREMENT, Kind.P
 
 
 _Stands = list[tuple[str, str, int]]
-_Matrix = list[tuple[str, str, list[tuple[ObligationView, list[Status | None]]]]]
+_Matrix = list[tuple[str, str, list[tuple[ObligationView, list[tuple[str, Status | None]]]]]]
 
 
 class Compiled(BytecodeCache):
@@ -143,6 +144,7 @@ def render_page(case: Case, json_digest: str = "") -> str:
         groups=[(node, _stands(views), views) for node, views in nodes.items()],
         total=len(case.obligations),
         counts=_counts(case.obligations),
+        partly={(r.obligation, r.method) for v in case.guarantees for r in v.records if r.bound.get(IN_PART)},
         matrix=matrix if len(case.guarantees) <= GUARANTEE_ROWS else [],
         graph=_svg_image(case.graph_svg),
         open_items=listed,
@@ -339,9 +341,9 @@ def _used_methods(case: Case) -> list[str]:
 def _matrix(case: Case) -> _Matrix:
     """For each node: each guarantee with the status that each method gives it (None: the method is not used for it)."""
     methods = _used_methods(case)
-    rows: dict[str, list[tuple[ObligationView, list[Status | None]]]] = {}
+    rows: dict[str, list[tuple[ObligationView, list[tuple[str, Status | None]]]]] = {}
     for view in case.guarantees:
-        rows.setdefault(view.obligation.node, []).append((view, [_cell(view, method) for method in methods]))
+        rows.setdefault(view.obligation.node, []).append((view, [(m, _cell(view, m)) for m in methods]))
     levels = {node.name: node.criticality for node in case.nodes}
     return [(node, levels.get(node, ""), found) for node, found in rows.items()]
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 from avow.base.verdict import Counterexample, Link, Outcome, Verdict, bound
 from avow.evidence.obligation import Obligation
+from avow.evidence.record import IN_PART
 from avow.formulas.ltl import TooLarge
 
 from . import psl
@@ -95,7 +96,7 @@ def outcome(obligation: Obligation, claim: Claim, frame: Frame) -> Outcome:
             **frame.bound,
             "properties": len(counted),
             "indices": list(claim.indices),
-            "nothing_shown_for": [p.about or p.key for p in hollow],
+            IN_PART: [p.about or p.key for p in hollow],
         },
         details,
         Link.MAPPED,

@@ -18,6 +18,7 @@ from avow.assurance.model import Case
 from avow.assurance.traceability import trace
 from avow.base.verdict import Verdict
 from avow.evidence.obligation import SYSTEM_LEVEL, Kind
+from avow.evidence.record import IN_PART
 from avow.evidence.status import Status
 from avow.report import gsn_svg, render_all, wording
 from avow.report.answers_page import render_index
@@ -314,3 +315,12 @@ def test_node_names_of_any_kind_have_a_page_each() -> None:
     pages = [wording.page_of(name) for name in names]
     assert len(set(pages)) == len(names)
     assert all(re.fullmatch(r"[\w.-]+\.html", page, re.ASCII) for page in pages)
+
+
+def test_a_verdict_that_shows_nothing_of_a_part_of_the_claim_says_so_where_it_stands() -> None:
+    target = guarantee("a", "g")
+    for hollow, shown in (([], "checked</span>"), (["g_3"], "checked, in part</span>")):
+        record = evidence(target, Verdict.CHECKED, bound={IN_PART: hollow})
+        texts = dict(every_text(make_case(system({"a": ["g"]}), [target], [record])))
+        assert shown in texts["claims.html"]
+        assert ("nothing shown for g" in texts["report.md"]) is bool(hollow)
