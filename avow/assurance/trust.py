@@ -30,13 +30,13 @@ def trust_lines(
     wanted = certifiable(proofs)
     certified = [p for p in wanted if p.grade in (ProofGrade.CERTIFIED_1, ProofGrade.CERTIFIED_2)]
     twice = sum(p.grade is ProofGrade.CERTIFIED_2 for p in certified)
-    tested = "Avow is not qualified; tested against an evaluator that shares no code, its translators are not proved"
+    tested = "not qualified; tested against an evaluator that shares no code, its translators are not proved"
     lines = [TrustLine("Avow's front end", "parser, type checker and translators", tested, True)]
     if wanted and kernel.run == run:
         lines.append(
             TrustLine(
                 "the kernel",
-                "it re-establishes each proof of the composition",
+                "of the composition's proofs",
                 f"{len(certified)} of {count(len(wanted), 'proof')} re-established in this run",
                 len(certified) < len(wanted),
             )
@@ -53,7 +53,7 @@ def trust_lines(
     tools.update(_named(r) for v in views for r in v.records if weigh(r).support in _SAMPLED or weigh(r).refuted)
     if tools:
         (tool, many), *others = sorted(tools.items())
-        names = listed([f"{tool}: {count(many, 'answer')}", *(f"{tool}: {many}" for tool, many in others)], 5)
+        names = listed([f"{tool}: {count(many, 'answer')}", *(f"{tool}: {many}" for tool, many in others)], 3)
         shown = sum(v.obligation.kind is Kind.GUARANTEE and v.status.supports for v in views)
         again = f"nothing checks these answers; {shown - single} of {count(shown, 'guarantee')} that hold"
         second = f"{again} ha{'s' if shown == 1 else 've'} a second method"

@@ -399,7 +399,7 @@ RULES = (
         lambda f, m, _b: (m[1], str(f.tools()[m[1].strip()])),
     ),
     _rule("q7", r"(\d+) of (\d+) guarantees? that hold", _confirmed),
-    _rule("q7", r"· and (\d+) more\)", _whole(lambda f: len(f.tools()) - 5)),
+    _rule("q7", r"· and (\d+) more\)", _whole(lambda f: len(f.tools()) - 3)),
     _rule("q7", r"without an owner \((.*?)(?: and (\d+) more)?\)", _bare),
     _rule("signature", r"assumptions (A\d+ to A\d+)", lambda f, _m, _b: (f"A1 to A{len(f.assumptions)}",)),
     _rule("signature", r"assumption A(\d+)\b", _whole(lambda f: len(f.assumptions))),
