@@ -7,7 +7,6 @@ import ctypes
 import os
 import resource
 import subprocess
-import sys
 import threading
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -29,7 +28,8 @@ class Cost:
 
 
 def cost(command: Sequence[str | Path], folder: Path, environment: Mapping[str, str] | None = None) -> Cost:
-    """Runs the command; Linux only. Memory is proportional: a page shared by n processes counts as 1/n in each."""
+    """Runs the command; Linux only. Memory is proportional: a page shared by n processes counts as 1/n in each. A
+    command that fails measures nothing: only the codes 0 and 1 (a gate fails) are accepted."""
     ctypes.CDLL(None).prctl(SUBREAPER, 1, 0, 0, 0)
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     process = subprocess.Popen(
@@ -37,19 +37,21 @@ def cost(command: Sequence[str | Path], folder: Path, environment: Mapping[str, 
         cwd=folder,
         env={**os.environ, **(environment or {})},
         stdout=subprocess.PIPE,
-        stderr=sys.stderr,
+        stderr=subprocess.PIPE,
         text=True,
     )
     over, peaks = threading.Event(), [0]
     watch = threading.Thread(target=_watch, args=(over, peaks))
     watch.start()
-    output, _ = process.communicate()
+    output, told = process.communicate()
     over.set()
     watch.join()
     with contextlib.suppress(ChildProcessError):
         while os.waitpid(-1, os.WNOHANG)[0]:  # those that ended; a child of ours that goes on is none of the command's
             pass
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    if process.returncode not in (0, 1):
+        raise SystemExit(f"{told}\n{command[0]} ended with code {process.returncode}")
     seconds = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
     return Cost(seconds, peaks[0] / 1024, output)
 
