@@ -1,10 +1,10 @@
 """The processes of a run's jobs: forks of a server that has imported everything, or else a new Python for each.
 
 Starting Python, importing Avow and Z3, and building the grammar's tables cost more than most jobs. A run has imported
-most of that before its first job. It forks a server while it has one thread; the server imports the
-rest and forks a supervisor for each job. The supervisor forks the job's process, ends it as soon as the run stops
-waiting, and ends whatever it left running. Where this process cannot be forked (several threads, systems other than
-Linux), each job gets a new Python.
+most of that before its first job. It imports the rest, which its own work needs too, and forks a server while it has
+one thread. The server forks a supervisor for each job. The supervisor forks the job's process, ends it as soon as the
+run stops waiting, and ends whatever it left running. Where this process cannot be forked (several threads, systems
+other than Linux), each job gets a new Python.
 """
 
 from __future__ import annotations
@@ -42,6 +42,7 @@ PLAIN = "AVOW_PLAIN_WORKERS"
 
 _PRELOADED = (
     WORKER,
+    "z3",
     "avow.calculus.obligations",
     "avow.language.load",
     "avow.sanity.claims",
@@ -67,6 +68,8 @@ class Processes:
         """Fork the server. Without effect if this process cannot be forked or has a server."""
         if self._owner == os.getpid() or not _may_fork():
             return
+        for name in _PRELOADED:
+            importlib.import_module(name)
         self._owner = os.getpid()
         self._control, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         self._server = _fork(theirs.fileno(), cwd, lambda: _serve(theirs))
@@ -171,10 +174,6 @@ def _fork(kept: int, cwd: Path, serve: Callable[[], None]) -> multiprocessing.pr
 
 def _serve(control: socket.socket) -> None:
     """In the server: a supervisor for each message, which names a job's folder, until the run closes the connection."""
-    for name in _PRELOADED:
-        importlib.import_module(name)
-    gc.collect()
-    gc.freeze()
     while True:
         message, descriptors, _, _ = socket.recv_fds(control, 4096, 1)
         if not message:

@@ -13,7 +13,6 @@ from importlib import resources
 from itertools import zip_longest
 from pathlib import Path
 from typing import Any
-from xml.sax.saxutils import quoteattr
 
 from jinja2 import Environment, PackageLoader, StrictUndefined, __version__
 from jinja2.bccache import Bucket, BytecodeCache
@@ -122,9 +121,13 @@ def environment() -> Environment:
     return found
 
 
+_BLANKS = {ord(blank): f"&#{ord(blank)};" for blank in "\t\n\r"}
+"""Blanks that a reader of XML would make spaces in an attribute."""
+
+
 def quoted(text: str) -> Markup:
     """The text as an XML attribute's value, with its quotation marks."""
-    return Markup(quoteattr(wording.clean(text)))
+    return Markup(Markup('"{}"').format(wording.clean(text)).translate(_BLANKS))  # escaped by format
 
 
 def fill(template: str, **given: Any) -> str:
