@@ -18,6 +18,7 @@ from avow.backends.hoare import BACKEND as HOARE
 from avow.backends.hypothesis import BACKEND as HYPOTHESIS
 from avow.backends.onnx import BACKEND as ONNX
 from avow.backends.python import BACKEND as PYTHON
+from avow.backends.reach import BACKEND as REACH
 from avow.backends.review import BACKEND as REVIEW
 from avow.backends.review.stamp import stamp
 from avow.backends.rosmonitoring import BACKEND as ROSMONITORING
@@ -285,6 +286,42 @@ class TestOnnx(Conformance):
         for name, limit, verdicts in (
             ("right", 100.0, both(Verdict.PROVED)),
             ("wrong", 121.0, one_refuted(Verdict.PROVED)),
+        )
+    )
+
+
+BRAKE = """\
+node brake {
+  inputs( a : REAL )
+  outputs( x : REAL, v : REAL )
+  topics( p/A a matches(in.a), p/X x matches(out.x), p/V v matches(out.v) )
+  assume range ( 2 <= in.a and in.a <= 3 )
+  guarantee warns "It stops in a metre" ( out.x <= 1.01 )
+  guarantee calm "It does not speed up" ( out.v <= 2 )
+}
+"""
+
+
+class TestReach(Conformance):
+    backend = REACH
+    seeded = tuple(
+        Seeded(
+            name,
+            BRAKE,
+            {
+                kind: {"x": moved, "v": slowed},
+                "initial": {"x": 0, "v": [0, 2]},
+                "inputs": {"a": "in.a"},
+                "outputs": {"out.x": "x", "out.v": "v"},
+                **more,
+            },
+            verdicts,
+            plan={"scenario": {"domains": {"brake.a": [2, 3]}, "steps": 3}} if name == "right" else {},
+        )
+        for name, kind, moved, slowed, more, verdicts in (
+            ("right", "ode", "v", "-a", {"horizon": 1.2, "step": 0.05}, both(Verdict.CHECKED)),
+            ("wrong", "ode", "v", "-a/2", {"horizon": 1.2, "step": 0.05}, one_refuted(Verdict.CHECKED)),
+            ("inductive", "map", "0.9 * x + v / 100", "v/2 - a/100", {}, both(Verdict.PROVED)),
         )
     )
 
