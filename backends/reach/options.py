@@ -83,12 +83,12 @@ def _shape(job: Job, kind: str) -> Iterator[Diagnostic]:
     for option in needed:
         if option not in options:
             yield _fault(job, "REACH101", f"an ode needs '{option}', in seconds")
-        elif not math.isfinite(options[option]):
+        elif not _is_finite(options[option]):
             yield _fault(job, "REACH101", f"'{option}' is no finite number", option)
     for option in useless:
         if option in options:
             yield _fault(job, "REACH101", f"'{option}' has no use for '{kind}'", option)
-    if all(math.isfinite(options.get(option, math.inf)) for option in ("horizon", "step")):
+    if all(_is_finite(options.get(option, math.inf)) for option in ("horizon", "step")):
         number = _exact(options["horizon"]) / _exact(options["step"])
         if number > STEPS:
             yield _fault(job, "REACH101", f"more than {STEPS} steps in the horizon: give a longer 'step'", "step")
@@ -106,7 +106,7 @@ def _initial(job: Job, states: Mapping[str, Any], faults: list[Diagnostic]) -> I
         low, high = entry if isinstance(entry, list) else (entry, entry)
         if name not in states:
             faults.append(_fault(job, "REACH101", f"'{name}' is no state", "initial", name, hint=suggest(name, states)))
-        elif not (math.isfinite(low) and math.isfinite(high) and low <= high):
+        elif not (_is_finite(low) and _is_finite(high) and low <= high):
             faults.append(_fault(job, "REACH101", f"'{name}' has an interval without values", "initial", name))
         else:
             yield name, Span(_exact(low), _exact(high))
@@ -136,6 +136,10 @@ def _unconnected(job: Job, option: str, given: Mapping[str, str], ports: tuple[P
             why = "is the port of two inputs" if name in taken else "is no REAL"
             yield _fault(job, "REACH102", f"{name} {why}", option, entry)
         taken.add(name)
+
+
+def _is_finite(number: float) -> bool:
+    return isinstance(number, int) or math.isfinite(number)  # which raises for a great int
 
 
 def _exact(number: float) -> Fraction:
