@@ -288,3 +288,40 @@ def test_a_solution_that_ends_is_stuck() -> None:
     with pytest.raises(Stuck):
         steps({"x": "x ** 2"}, [(1, 1)], "2", "0.05")
     assert Series(((interval(Fraction(2)),),)).sqrt().of[0][0].lb() < math.sqrt(2) + 1e-9
+
+
+@pytest.mark.slow
+@pytest.mark.needs_motion
+@pytest.mark.parametrize("seed", range(12))
+def test_verdicts_on_maps_against_runs(seed: int, tmp_path: Path) -> None:
+    """What is proved holds in each of 500 runs with extreme inputs, and what a run breaks is never supported."""
+    draw = random.Random(seed)
+    factors = [[draw.randint(-8, 8) / 10 for _ in range(4)] for _ in range(2)]
+    text = ["{} * x + {} * w + {} * u + {}".format(*row) for row in factors]
+    limit = draw.randint(1, 60) / 10
+    formula = draw.choice(["abs(out.y) <= {0}", "in.u >= 0 -> out.y + out.z <= {0}", "max(out.y, out.z) < {0}"])
+    greatest = 0.0
+    holds = {
+        "a": lambda y, z, u: abs(y),
+        "i": lambda y, z, u: y + z if u >= 0 else -1e9,
+        "m": lambda y, z, u: max(y, z),
+    }[formula[0]]
+    for _ in range(500):
+        x, w = draw.choice([-1.0, 1.0]), 0.0
+        for _ in range(40):
+            u = draw.choice([-1.0, 1.0])
+            x, w = (a * x + b * w + c * u + d for a, b, c, d in factors)
+            greatest = max(greatest, holds(x, x / 2 + w, u))
+    options = {"map": {"x": text[0], "w": text[1]}, "initial": {"x": [-1, 1], "w": 0}, "steps": 40}
+    outputs = {"out.y": "x", "out.z": "x / 2 + w"}
+    found = judged(tmp_path, formula.format(limit), **options, outputs=outputs)
+    if greatest > limit + 1e-9:
+        assert not found.verdict.supports, found.summary
+    if found.verdict is Verdict.REFUTED:
+        assert found.counterexample is not None
+
+
+def test_a_box_that_is_left_again_proves_nothing(tmp_path: Path) -> None:
+    motion = {"ode": {"x": "-x + 2 * u"}, "initial": {"x": [-1, 1]}, "horizon": 3, "step": 0.05}
+    assert judged(tmp_path / "1", "out.y <= 3", **motion).verdict is Verdict.CHECKED
+    assert judged(tmp_path / "2", "out.y <= 1.5", **motion).verdict is Verdict.REFUTED
