@@ -32,6 +32,7 @@ node mover {{
 }}
 """
 FALLING = {"ode": {"x": "-x + u"}, "initial": {"x": [0, 2]}, "horizon": 2, "step": 0.05}
+TWO = {"ode": {"x": "-x", "c": "1"}, "initial": {"x": [-1, 1], "c": 0}, "outputs": {"out.z": "c"}}
 FILTER = {"map": {"x": "0.9 * x + 0.1 * u", "w": "x"}, "initial": {"x": 0, "w": 0}}
 PORTS = {"inputs": {"u": "in.u"}, "outputs": {"out.y": "x", "out.z": "x / 2 + u"}}
 
@@ -72,6 +73,9 @@ def judged(folder: Path, formula: str, **options: Any) -> Outcome:
         ("abs(out.y) <= 50", {**FILTER, "map": {"x": "x + u", "w": "x"}, "steps": 50}, Verdict.CHECKED),
         ("abs(out.y) <= 500", {**FILTER, "map": {"x": "x + u", "w": "x"}}, Verdict.UNKNOWN),
         ("abs(out.y) <= 50", {**FILTER, "map": {"x": "x + u", "w": "x"}, "steps": 51}, Verdict.REFUTED),
+        ("out.z <= 1000", {**FILTER, "map": {"x": "x / 2", "w": "w + 1"}, "outputs": {"out.z": "w"}}, Verdict.UNKNOWN),
+        ("out.y <= 1", {**FILTER, "map": {"x": "x / 2", "w": "x"}, "initial": {"x": 8, "w": 0}}, Verdict.REFUTED),
+        ("out.z <= 9", {**FALLING, **TWO}, Verdict.CHECKED),
         ("out.y < out.z", {**FILTER, "map": {"x": "10**9 * (x + u)", "w": "x"}}, Verdict.REFUTED),
     ],
 )
@@ -99,6 +103,19 @@ def test_boxes_are_kept(tmp_path: Path) -> None:
     assert head == "from (s),to (s),x min,x max,out.y min,out.y max,out.z min,out.z max"
     assert len(lines) == 40
     assert report.logs["enclosure.svg"].count("<rect") == 2 * 41
+
+
+@pytest.mark.parametrize(
+    ("assumed", "formula"),
+    [("in.u * in.u <= 0.01", "out.y <= 1.2"), ("(if in.u <= 0.5 then 3 else 7) != in.u", "in.u <= 0.6")],
+)
+def test_assumptions_that_bound_no_box(assumed: str, formula: str, tmp_path: Path) -> None:
+    """Neither does a counterexample break them, nor does a comparison within them bound an input."""
+    contract = NODE.replace("abs(in.u) <= 1", f"abs(in.u) <= 1 and {assumed}").format(formula)
+    motion = {**PORTS, **FALLING, "ode": {"x": "-x + 2 * u"}, "initial": {"x": 0}}
+    job = Seeded("n", contract, motion, {"g": Verdict.UNKNOWN}).written(BACKEND, tmp_path / "system")
+    (found,) = settle(BACKEND, job, tmp_path / "made", Limits()).outcomes
+    assert found.verdict is (Verdict.UNKNOWN if "out" in formula else Verdict.REFUTED), found.summary
 
 
 def test_an_input_without_bounds_is_named(tmp_path: Path) -> None:
