@@ -94,15 +94,19 @@ def translate(tool: Backend, notation: str, system: System, node: Node) -> Trans
     if missing and len(missing) == len(node.guarantees):
         return Translated({}, missing)
     system = _one_step(system) if missing and not tool.remembers else system
+    others = tuple(c for c in node.guarantees if c.chance is None)
+    if len(others) < len(node.guarantees):
+        nodes = (replace(n, guarantees=others) if n.name == node.name else n for n in system.contract.nodes)
+        system = replace(system, contract=replace(system.contract, nodes=tuple(nodes)))
     made = tool.translate(notation, system, system.contract.node(node.name) if missing else node)
     return replace(made, missing=(*made.missing, *missing))
 
 
 def _sayable(tool: Backend, job: Job) -> tuple[Job, Mapping[str, str]]:
     """The job without the guarantees that the backend cannot express, and the reasons, by obligation."""
-    if tool.remembers and tool.answers_itself(job):
-        return job, {}
-    reasons = {o.id: _refusal(tool, job.node, job.clause(o)) for o in job.obligations}
+    own = tool.remembers and tool.answers_itself(job)
+    why = _no_chance if own else _refusal
+    reasons = {o.id: why(tool, job.node, job.clause(o)) for o in job.obligations}
     refused = {name: why for name, why in reasons.items() if why is not None}
     left = tuple(o for o in job.obligations if o.id not in refused)
     if tool.remembers or not any(histories(c.formula) for node in job.contract.nodes for c in node.clauses):
@@ -120,7 +124,17 @@ def refusal(judge: str, node: Node, clause: Clause) -> str | None:
     return f"{judge} judges single steps and has no `{_shown(record)}`, of which {about} speaks"
 
 
+def _no_chance(tool: Backend, node: Node, clause: Clause) -> str | None:
+    """Why a method cannot check a guarantee with a probability; None if it can, or there is none."""
+    if clause.chance is None or tool.chances:
+        return None
+    about = f"{node.name}.{clause.name}"
+    return f"{tool.name} shows no probability, as {about} has it: recorded steps do, with the method experiment"
+
+
 def _refusal(tool: Backend, node: Node, clause: Clause) -> str | None:
+    if why := _no_chance(tool, node, clause):
+        return why
     return tool.unsaid(node, clause) if tool.remembers else refusal(tool.name, node, clause)
 
 

@@ -351,6 +351,9 @@ class Backend(ABC):
     remembers: bool = False
     """Whether it judges clauses about other steps (`avow.formulas.temporal`), or does not read formulas at all. Other
     backends never see such a clause: the guarantee is refused by name."""
+    chances: bool = False
+    """Whether it judges guarantees with a probability by `Clause.chance`; their formula is TRUE. Other backends never
+    see such an obligation."""
     uses_source: bool = False
     """Whether an answer may depend on the node's `source:`, `numbers:` and `memory:`. With False they are not in the
     job."""

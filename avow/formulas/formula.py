@@ -128,7 +128,15 @@ def meaning(term: t.Term) -> str:
 def node_digest(node: Node, clause: Clause) -> str:
     """SHA-256 of one clause under its node's assumptions: the identity that evidence refers to."""
     assumed = digest(*(a.formula for a in node.assumptions if a != clause))
-    return _hash(str(clause.kind), digest(clause.formula), assumed)
+    return _hash(str(clause.kind), clause_digest(clause), assumed)
+
+
+def clause_digest(clause: Clause) -> str:
+    """SHA-256 of what a clause claims, with its probability."""
+    if (chance := clause.chance) is None:
+        return digest(clause.formula)
+    unit = "run" if chance.per_run else "step"
+    return _hash("chance", str(chance.least), unit, meaning(chance.given), meaning(chance.claim))
 
 
 def sort_digest(sort: s.Sort) -> str:

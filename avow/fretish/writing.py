@@ -45,6 +45,8 @@ def _named(node: Node, clause: Clause) -> str:
 
 def _sentence(node: Node, clause: Clause, twice: set[str]) -> str:
     formula = clause.formula
+    if clause.chance is not None:
+        raise _Beyond("a probability")
     doubled = {part.name for part in free_variables(formula)} & twice
     if doubled:
         raise _Beyond(f"an input and an output that are both called `{min(doubled)}`")

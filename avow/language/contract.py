@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from dataclasses import field
 from enum import StrEnum
+from fractions import Fraction
 from typing import Any
 
 from avow.base.diagnostics import Diagnostic, Span
 from avow.base.records import dataclass
 from avow.base.remembered import by_identity
 from avow.language.sorts import Sort
-from avow.language.terms import TRUE, Compare, History, Limit, Past, Role, Term, Variable
+from avow.language.terms import TRUE, Compare, History, Implies, Limit, Past, Role, Term, Variable
 
 TO_WRITE = "to_write"
 """The name that a draft gives to a guarantee that a person has yet to write."""
@@ -19,6 +20,24 @@ TO_WRITE = "to_write"
 class ClauseKind(StrEnum):
     ASSUMPTION = "assumption"
     GUARANTEE = "guarantee"
+
+
+@dataclass(frozen=True, slots=True)
+class Chance:
+    """``with probability >= 0.99 given (in.present) ( out.detected )``: whatever happened before, a step that meets
+    `given` meets `claim` with a probability of at least `least`; `per_run`: a run meets it at all its steps with that
+    probability, and nothing is given."""
+
+    least: Fraction
+    """Greater than 0 and less than 1."""
+    claim: Term
+    given: Term = TRUE
+    per_run: bool = False
+
+    @property
+    def always(self) -> Term:
+        """What a step does that keeps the guarantee."""
+        return self.claim if self.given == TRUE else Implies(self.given, self.claim)
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,11 +57,18 @@ class Clause:
     written: Term | None = field(default=None, compare=False, repr=False)
     """The formula as written, without the conditions for a value, if it was read from a file: for messages about the
     text."""
+    chance: Chance | None = None
+    """Of a guarantee with a probability. Its `formula` is then TRUE, so that nothing uses it as if it always held."""
+
+    @property
+    def spoken(self) -> Term:
+        """The formula, or what is claimed with a probability: for questions about the text, never as a premise."""
+        return self.formula if self.chance is None else self.chance.always
 
     @property
     def unwritten(self) -> bool:
         """Whether it is a draft's placeholder: a guarantee `to_write` with the formula TRUE."""
-        return self.kind is ClauseKind.GUARANTEE and self.name == TO_WRITE and self.formula == TRUE
+        return self.kind is ClauseKind.GUARANTEE and self.name == TO_WRITE and self.spoken == TRUE
 
     @property
     def pace(self) -> Limit | None:

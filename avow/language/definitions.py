@@ -12,10 +12,10 @@ from dataclasses import replace
 from avow.base.diagnostics import Span
 from avow.base.remembered import by_identity
 from avow.language.contract import Clause, Definition, Node
-from avow.language.printer import StyleName, show_term
+from avow.language.printer import StyleName, show_number, show_term
 from avow.language.sorts import FunctionSort
 from avow.language.subterms import subterms
-from avow.language.terms import Apply, Quantified, Role, Term, Variable
+from avow.language.terms import TRUE, Apply, Quantified, Role, Term, Variable
 
 
 def expand(
@@ -51,7 +51,15 @@ def show_clause(clause: Clause, node: Node, style: StyleName = "unicode") -> str
     """The clause's formula for people: instances of the definitions that its text uses are shown by name, followed by
     the definitions."""
     known = used(clause.text, node.definitions)
-    shown = show_term(folded(clause.formula, known), style)
+
+    def said(term: Term) -> str:
+        return show_term(folded(term, known), style)
+
+    shown = said(clause.formula)
+    if (chance := clause.chance) is not None:
+        given = f" given {said(chance.given)}" if chance.given != TRUE else ""
+        least = show_number(chance.least)[0]
+        shown = f"{said(chance.claim)}{given}, with probability ≥ {least}{' per run' * chance.per_run}"
     return ", where ".join((shown, "; ".join(_said(d, known, style) for d in known))) if known else shown
 
 

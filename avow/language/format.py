@@ -87,6 +87,7 @@ class _Layout:
         self.declarations: dict[int, syntax.Declaration] = {tree.start: tree for tree in tree.declarations}
         self.topics: dict[int, syntax.TopicList] = {}
         self.formulas: dict[int, syntax.TermSyntax] = {}
+        self.chances = {c.start: c.chance for node in tree.nodes for c in node.clauses if c.chance is not None}
         for node in tree.nodes:
             self.declarations |= {part.start: part for part in node.definitions}
             if node.topics is not None:
@@ -176,7 +177,8 @@ class _Layout:
             kind = self.kind()
             depth += (kind in ("LPAR", "LBRACE")) - (kind in ("RPAR", "RBRACE"))
             self.at += 1
-            if depth == 0 and (kind == "SEMICOLON" if is_declaration else kind == "RPAR"):
+            given = kind == "RPAR" and self.kind() == "LPAR"
+            if depth == 0 and not given and (kind == "SEMICOLON" if is_declaration else kind == "RPAR"):
                 break
         own = self.stream[first : self.at]
         start, end = own[0].start, own[-1].end
@@ -214,8 +216,11 @@ class _Layout:
         if own[0].text == "steps":
             return [flat(own)]
         keyword = _SHORT.get(own[0].text, own[0].text)
-        at = next(k for k, token in enumerate(own) if token.type == "LPAR")
+        at = first = next(k for k, token in enumerate(own) if token.type == "LPAR")
         head = " ".join([keyword, *(token.text for token in own[1:at])])
+        if (chance := self.chances.get(own[0].start)) is not None:
+            at = next(k for k, token in enumerate(own) if token.start >= chance.end)
+            head += f" ( {flat(own[first + 1 : at - 1])} ) " if chance.given is not None else " "
         inside = own[at + 1 : -1]
         if not inside:
             return [head + "()"]
@@ -229,10 +234,10 @@ class _Layout:
             return [f"{head}( {items[0]},", *(f"{pad}{item}," for item in items[1:-1]), f"{pad}{items[-1]} )"]
         tree = self.formulas[inside[0].start]
         line = f"{head}( {flat(inside)} )"
-        if own[at - 1].type != "STRING" and _STEP + len(line) <= WIDTH:
+        if not any(token.type == "STRING" for token in own[:first]) and _STEP + len(line) <= WIDTH:
             return [line]
         lines = self.laid(tree, 2 * _STEP + 2, WIDTH - 2)
-        return [head, *_enclosed(f"{' ' * (2 * _STEP)}( ", lines, " )")]
+        return [head.rstrip(), *_enclosed(f"{' ' * (2 * _STEP)}( ", lines, " )")]
 
     # --- trees to lines ----------------------------------------------------------------------------------------------
 

@@ -148,7 +148,8 @@ def _about_text(file: LintedFile, node: NodeSyntax) -> Iterator[Diagnostic]:
     for clause in node.clauses:
         if clause.formula is None:
             continue
-        for reading in misreadings(clause.formula, source.text):
+        parts = (clause.chance.given, clause.formula) if clause.chance is not None else (clause.formula,)
+        for reading in (found for part in parts if part is not None for found in misreadings(part, source.text)):
             span = source.span(reading.start, reading.end)
             yield _warning(
                 "RCL401",
@@ -191,6 +192,7 @@ def unspoken(name: str) -> str:
 def spoken(node: NodeSyntax) -> frozenset[str]:
     """The names that a node's definitions and clauses mention."""
     bodies = [*(d.body for d in node.definitions), *(c.formula for c in node.clauses if c.formula is not None)]
+    bodies += [c.chance.given for c in node.clauses if c.chance is not None and c.chance.given is not None]
     return frozenset(name for body in bodies for name in _spoken(body))
 
 
@@ -205,8 +207,8 @@ def _spoken(tree: Syntax) -> set[str]:
 
 def _about_node(node: Node) -> Iterator[Diagnostic]:
     written = not node.unwritten
-    in_clauses = {v for clause in node.clauses for v in _variables(clause.formula)}
-    in_guarantees = {v for clause in node.guarantees for v in _variables(clause.formula)}
+    in_clauses = {v for clause in node.clauses for v in _variables(clause.spoken)}
+    in_guarantees = {v for clause in node.guarantees for v in _variables(clause.spoken)}
     for port in node.inputs if written else ():
         if (t.Role.INPUT, port.name) not in in_clauses:
             message = f"no clause of `{node.name}` speaks of its input `{port.name}`"
@@ -249,7 +251,7 @@ def _about_node(node: Node) -> Iterator[Diagnostic]:
             yield _warning("RCL416", message, clause.formula.span, "assume of inputs, guarantee of outputs")
     elements = elements_of((node,)) if any(clause.sentence for clause in node.clauses) else {}
     for clause in node.clauses:
-        for unused in _unused(clause.formula):
+        for unused in _unused(clause.spoken):
             message = f"`{unused.name}` is quantified and never used"
             yield _warning("RCL407", message, unused.span, "remove it, or tie it to what was meant")
         for position in _calculated(clause.written or clause.formula):
@@ -271,7 +273,7 @@ def uncarried(node: str, port: str) -> str:
 
 def _looked_up(node: Node) -> Iterator[Diagnostic]:
     """A warning for each total function that the node looks up by its value."""
-    found = {look.function: look for clause in reversed(node.clauses) for look in lookups(clause.formula)}
+    found = {look.function: look for clause in reversed(node.clauses) for look in lookups(clause.spoken)}
     for port in (*node.inputs, *node.outputs):
         look = found.get(port.variable)
         if look is None or not isinstance(port.sort, FunctionSort):

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
+from fractions import Fraction
 
 from avow.base.diagnostics import Diagnostic, Span
 from avow.base.suggestions import did_you_mean
 from avow.base.tuning.sizes import CLAUSE_PARTS, NESTING
 from avow.language.checker import Checker
-from avow.language.contract import Clause, ClauseKind, Node, Port, Topic
+from avow.language.contract import Chance, Clause, ClauseKind, Node, Port, Topic
 from avow.language.declarations import Declarations, no_units
 from avow.language.definedness import with_value
 from avow.language.flat import flat_text
@@ -19,8 +20,8 @@ from avow.language.scope import Defined, Scope
 from avow.language.sorts import BoolSort, EnumSort, IntegerSort, NaturalSort, RealSort, Sort, StringSort
 from avow.language.source import Reports
 from avow.language.subterms import histories, term_extent
-from avow.language.syntax import ClauseSyntax, NodeSyntax, PortDeclaration, RosType, SetType
-from avow.language.terms import Role, Term
+from avow.language.syntax import ChanceSyntax, ClauseSyntax, NodeSyntax, PortDeclaration, RosType, SetType
+from avow.language.terms import TRUE, Role, Term
 from avow.language.units import BASES, DERIVED, ONE_UNIT, clashes, unit
 from avow.ros.calls import part_topic
 from avow.ros.names import is_name
@@ -173,15 +174,59 @@ def _clause(
     seen.setdefault(name, span)
     if syntax.formula is None:
         return None
+    if syntax.chance is not None:
+        return _with_chance(syntax, syntax.chance, name, position, scope, reports)
     formula = Checker(scope, reports).clause(syntax.formula)
     if formula is None or not _is_small(formula, place, scope, reports):
         return None
     text = reports.source.text[slice(*syntax.inside)].strip()
-    sentence = unquote(syntax.sentence.text) if syntax.sentence is not None else None
-    whole = reports.source.span(syntax.start, syntax.end)
-    quoted = reports.source.span(syntax.sentence.start, syntax.sentence.end) if syntax.sentence is not None else None
-    said = with_value(formula)
-    return Clause(syntax.kind, name, position, said, sentence, text, whole, quoted, formula)
+    return Clause(syntax.kind, name, position, with_value(formula), *_quoted(syntax, text, reports), formula)
+
+
+def _quoted(syntax: ClauseSyntax, text: str, reports: Reports) -> tuple[str | None, str, Span, Span | None]:
+    """The sentence, text, span and sentence's span of a clause."""
+    sentence, span = syntax.sentence, reports.source.span
+    quoted = (unquote(sentence.text), span(sentence.start, sentence.end)) if sentence is not None else (None, None)
+    return quoted[0], text, span(syntax.start, syntax.end), quoted[1]
+
+
+def _with_chance(
+    syntax: ClauseSyntax, chance: ChanceSyntax, name: str, position: int, scope: Scope, reports: Reports
+) -> Clause | None:
+    """A guarantee with a probability, which is about single steps."""
+    fault = _no_probability(syntax.kind, chance.least.text)
+    if chance.per_run and chance.given is not None:
+        fault = ("a probability per run has no `given`: it counts every run", "write `per run ( F -> G )`")
+    if fault:
+        message, hint = fault
+        reports.error("RCL224", message, chance.start, chance.end, hint=hint)
+    checker = Checker(replace(scope, remembers=False), reports)
+    assert syntax.formula is not None
+    given = TRUE if chance.given is None else checker.formula(chance.given)
+    claim = checker.formula(syntax.formula)
+    if fault or given is None or claim is None:
+        return None
+    place = syntax.name or Token("", "", syntax.start, syntax.start + 1)
+    if not all(_is_small(formula, place, scope, reports) for formula in (given, claim)):
+        return None
+    text = f"{reports.source.text[chance.start : chance.end]} ( {reports.source.text[slice(*syntax.inside)].strip()} )"
+    least, written = Fraction(chance.least.text), Chance(Fraction(chance.least.text), claim, given).always
+    made = Chance(least, with_value(claim), with_value(given), chance.per_run)
+    return Clause(syntax.kind, name, position, TRUE, *_quoted(syntax, text, reports), written, made)
+
+
+def _no_probability(kind: ClauseKind, text: str) -> tuple[str, str] | None:
+    """What is wrong with a bound, and a hint; None if nothing is."""
+    if kind is ClauseKind.ASSUMPTION:
+        return "an assumption has no probability", "assume what always holds; guarantees may have a probability"
+    least = Fraction(text)
+    if least > 1:
+        return f"{text} is no probability", "write a number between 0 and 1"
+    if least == 1:
+        return "probability 1 says that the guarantee always holds", "leave `with probability >= 1` out"
+    if least == 0:
+        return "probability 0 demands nothing", "write a number between 0 and 1, or leave the guarantee out"
+    return None
 
 
 def _is_small(formula: Term, place: Token, scope: Scope, reports: Reports) -> bool:

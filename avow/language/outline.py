@@ -16,7 +16,16 @@ from avow.language.expectations import SECTION_FORMS, about_keyword
 from avow.language.lexer import Token
 from avow.language.parser import parse
 from avow.language.source import Reports
-from avow.language.syntax import ClauseSyntax, Declaration, Define, FileSyntax, NodeSyntax, PortList, TopicList
+from avow.language.syntax import (
+    ChanceSyntax,
+    ClauseSyntax,
+    Declaration,
+    Define,
+    FileSyntax,
+    NodeSyntax,
+    PortList,
+    TopicList,
+)
 
 _OPEN = {"LPAR": "RPAR", "LBRACE": "RBRACE"}
 _NESTED = {**_OPEN, "LSQUARE": "RSQUARE"}
@@ -28,6 +37,7 @@ _CLAUSES = {"ASSUME": ClauseKind.ASSUMPTION, "GUARANTEE": ClauseKind.GUARANTEE}
 _SECTIONS = frozenset((*_LISTS, "DEFINE", *_CLAUSES))
 _CONTEXTS = frozenset(("context", "contexts", "type", "types", "constant", "constants"))
 """Words that earlier tools and authors use for `context`."""
+_CHANCE = "write `guarantee NAME with probability >= 0.99 given (F) ( G )`; `given (F)` may be left out"
 _SIGN = {"LPAR": "(", "RPAR": ")", "LBRACE": "{", "RBRACE": "}"}
 
 
@@ -341,14 +351,17 @@ class _OutlineReader:
             node.definitions += [tree] if isinstance(tree, Define) else []
             return
         self.at += 1
-        name = sentence = None
+        name = sentence = chance = None
+        sound = True
         if section in _CLAUSES:
-            if self.kind() == "NAME":
+            if self.kind() == "NAME" and not self.has_chance():
                 name = self.tokens[self.at]
                 self.at += 1
             if self.kind() == "STRING":
                 sentence = self.tokens[self.at]
                 self.at += 1
+            if self.has_chance():
+                chance, sound = self.chance()
         if self.kind() != "LPAR":
             hint = f"write `{keyword.text}( … )`"
             if section in _CLAUSES and self.kind() not in ("LBRACE", "RBRACE", "$END"):
@@ -382,7 +395,9 @@ class _OutlineReader:
                     hint = "leave it out: no assumption means that every input is accepted"
                 self.reports.error("RCL119", message, opening.start, self.tokens[close].end, hint=hint)
             whole = (keyword.start, self.tokens[close].end)
-            node.clauses.append(ClauseSyntax(_CLAUSES[section], name, sentence, formula, (opening.end, end), *whole))
+            formula = formula if sound else None
+            inside = (opening.end, end)
+            node.clauses.append(ClauseSyntax(_CLAUSES[section], name, sentence, formula, inside, *whole, chance))
         else:
             listing: PortList | TopicList | None
             if section == "TOPICS":
@@ -399,6 +414,37 @@ class _OutlineReader:
                 node.broken.update(t.text for t in part if t.type == "NAME")
             else:
                 self.out.parts.extend((t.start, t.end) for t in listing.items)
+
+    def has_chance(self) -> bool:
+        """Whether ``with probability`` begins here."""
+        return self.words(0) == "with" and self.words(1) == "probability"
+
+    def words(self, ahead: int) -> str:
+        return self.tokens[self.at + ahead].text if self.kind(ahead) == "NAME" else ""
+
+    def chance(self) -> tuple[ChanceSyntax | None, bool]:
+        """The probability here, and whether it has no syntax error (which is reported)."""
+        start = self.tokens[self.at].start
+        self.at += 2
+        if (self.kind(), self.kind(1)) != ("GE", "NUMBER"):
+            self.complain("RCL113", "expected `>= P` after `with probability` and not %", _CHANCE)
+            return None, False
+        self.at += 2
+        least, given = self.tokens[self.at - 1], None
+        if per_run := (self.words(0), self.words(1)) == ("per", "run"):
+            self.at += 2
+        if self.words(0) == "given":
+            self.at += 1
+            first = self.at
+            self.at += (self.kind(), self.kind(1)) == ("LPAR", "RPAR")
+            if self.kind() != "LPAR" or (close := self.balanced()) is None:
+                self.complain("RCL113", "expected a formula in parentheses after `given` and not %", _CHANCE)
+                return None, False
+            part, (begin, end) = self.tokens[first + 1 : close], (self.tokens[first].end, self.tokens[close].start)
+            given = parse("formula", part, self.reports, end, begin)
+            if given is None:
+                return None, False
+        return ChanceSyntax(least, per_run, given, start, self.tokens[self.at - 1].end), True
 
     def unclosed(self, opening: Token) -> None:
         """Reports a bracket without partner."""

@@ -404,6 +404,18 @@ Syntax = (
 
 
 @dataclass(frozen=True, slots=True)
+class ChanceSyntax:
+    """``with probability >= 0.99 per run given (F)``, before the formula of a guarantee."""
+
+    least: Token
+    per_run: bool
+    given: TermSyntax | None
+    """None: every step counts."""
+    start: int
+    end: int
+
+
+@dataclass(frozen=True, slots=True)
 class ClauseSyntax:
     kind: ClauseKind
     name: Token | None
@@ -414,6 +426,7 @@ class ClauseSyntax:
     """The offsets of the formula, between the parentheses."""
     start: int
     end: int
+    chance: ChanceSyntax | None = None
 
 
 @dataclass(slots=True)

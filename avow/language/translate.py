@@ -19,9 +19,9 @@ from avow.language.format import format_text
 from avow.language.lexer import quote
 from avow.language.load import check_text
 from avow.language.nodes import PARAMETER
-from avow.language.printer import show_sort, show_term, show_type
+from avow.language.printer import show_number, show_sort, show_term, show_type
 from avow.language.sorts import BOOL
-from avow.language.terms import Conditional, Literal, Term
+from avow.language.terms import TRUE, Conditional, Literal, Term
 
 
 def to_rcl(contract: Contract) -> str:
@@ -46,7 +46,8 @@ def to_rcl(contract: Contract) -> str:
             if _is_own_section(clause) or clause.name in node.implied:
                 continue
             word = "assume" if clause in node.assumptions else "guarantee"
-            out.append(f"  {word}{_head(clause)}( {show_term(clause.formula, 'rcl')} )")
+            claim = clause.formula if clause.chance is None else clause.chance.claim
+            out.append(f"  {word}{_head(clause)}( {show_term(claim, 'rcl')} )")
         out += ["}", ""]
     try:
         text = format_text("\n".join(out), "contract.rcl")
@@ -101,7 +102,12 @@ def _typed(port: Port) -> str:
 def _head(clause: Clause) -> str:
     letter = "A" if clause.kind == "assumption" else "G"
     name = "" if clause.name == f"{letter}{clause.position}" else f" {clause.name}"
-    return name + (f" {quote(clause.sentence)} " if clause.sentence is not None else "")
+    said = name + (f" {quote(clause.sentence)} " if clause.sentence is not None else "")
+    if (chance := clause.chance) is None:
+        return said
+    given = f"given ( {show_term(chance.given, 'rcl')} ) " if chance.given != TRUE else ""
+    least = show_number(chance.least)[0]
+    return f"{said} with probability >= {least} {'per run ' * chance.per_run}{given}"
 
 
 def _topic(topic: Topic) -> str:
@@ -158,7 +164,7 @@ def to_json(contract: Contract) -> str:
             part = getattr(value, field.name)
             if field.name == "sort":
                 found["sort"] = show_sort(part, named=named)
-            elif field.name not in _INTERNAL:
+            elif field.name not in _INTERNAL and (field.name != "chance" or part is not None):
                 found[field.name] = data(part)
         return found
 

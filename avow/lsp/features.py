@@ -157,7 +157,7 @@ def _of_meaning(contract: Contract, meaning: Meaning, status: StatusLookup, sani
         case What.FIELD:
             return f"field `{name}` of a record"
         case What.VARIABLE:
-            formulas = (clause.formula for node in contract.nodes for clause in node.clauses)
+            formulas = (clause.spoken for node in contract.nodes for clause in node.clauses)
             quantified = (part for formula in formulas for part in subterms(formula) if isinstance(part, Quantified))
             sorts = {v.sort for part in quantified for v in part.variables if v.name == name}
             of = f" : `{show_sort(sorts.pop())}`" if len(sorts) == 1 else ""

@@ -225,6 +225,8 @@ class _Reader:
             yield Occurrence(meaning, self.text_.file, start, end, True, written)
             if clause.formula is not None:
                 yield from self.in_formula(clause.formula, {})
+            if clause.chance is not None and clause.chance.given is not None:
+                yield from self.in_formula(clause.chance.given, {})
             else:
                 first, last = clause.inside
                 yield from self.in_words([t for t in self.text_.tokens if first <= t.start < last])

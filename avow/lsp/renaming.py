@@ -127,7 +127,7 @@ def _bare(one: Meaning) -> Meaning:
 
 
 def _clauses(contract: Contract) -> Iterator[Any]:
-    return (clause.formula for node in contract.nodes for clause in node.clauses)
+    return (clause.spoken for node in contract.nodes for clause in node.clauses)
 
 
 def _new_faults(project: Project, after: Project) -> list[Diagnostic]:

@@ -94,7 +94,8 @@ def _tasks(workspace: Workspace, work: Work) -> list[_Task]:
     found = []
     for obligation in (o for o in work.obligations if o.kind is Kind.GUARANTEE):
         records = [e.evidence for e in ledger.current(obligation.id, work.keys[obligation.id])]
-        if records and records[-1].verdict.supports and not records[-1].vacuous:
+        likely = work.system.contract.node(work.node).clause(obligation.name).chance is not None
+        if records and records[-1].verdict.supports and not records[-1].vacuous and not likely:
             found.append((work, obligation, records[-1]))
     return found
 

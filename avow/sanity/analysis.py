@@ -23,6 +23,7 @@ from avow.formulas.values import Value
 from avow.formulas.written import show_values
 from avow.language.contract import ClauseKind, Node
 from avow.language.sorts import FunctionSort, IntegerSort, NaturalSort, RealSort
+from avow.language.subterms import histories
 from avow.language.terms import Compare, Not, Role, Term, Variable
 from avow.sanity.claims import Claim, Property, claims, triggers
 from avow.sanity.conflicts import conflicts
@@ -52,17 +53,15 @@ def analyse(
     `scenario` fixes some inputs of an example that is not found otherwise.
     """
     bounds = bounds or Bounds()
-    analysis = (
-        OverRuns(node, Patience(bounds.effort), bounds.seed)
-        if remembers(node)
-        else _Analysis(node, scenario or {}, bounds)
-    )
+    steps = _Analysis(_of_one_step(node), scenario or {}, bounds)
+    analysis = OverRuns(node, Patience(bounds.effort), bounds.seed) if remembers(node) else steps
+    likely = {clause.name for clause in node.guarantees if clause.chance is not None}
     results = []
     asked = claims(node)
     chosen = [k for k, claim in enumerate(asked) if wanted is None or claim.name in wanted]
     for claim in asked[: max(chosen, default=-1) + 1]:
         start = time.monotonic()
-        finding = analysis.settle(claim)
+        finding = (steps if claim.subject in likely else analysis).settle(claim)
         results.append(SanityResult.of(node.name, claim, finding, time.monotonic() - start))
     return tuple(results[k] for k in chosen)
 
@@ -81,6 +80,14 @@ def outcomes(
     return tuple(as_outcome(identity, node.name, name, results.get(name)) for identity, name in obligations.items())
 
 
+def _of_one_step(node: Node) -> Node:
+    """The node without the clauses about other steps: guarantees with a probability are about one."""
+    if not remembers(node):
+        return node
+    kept = [tuple(c for c in clauses if not histories(c.formula)) for clauses in (node.assumptions, node.guarantees)]
+    return replace(node, assumptions=kept[0], guarantees=kept[1])
+
+
 class _Analysis:
     """One node under analysis. Each claim is decided once and reused by others."""
 
@@ -93,7 +100,7 @@ class _Analysis:
         self.inputs = tuple(port.variable for port in node.inputs)
         self.outputs = tuple(port.variable for port in node.outputs)
         self.assumptions = {c.name: c.formula for c in node.assumptions}
-        self.guarantees = {c.name: c.formula for c in node.guarantees}
+        self.guarantees = {c.name: c.formula for c in node.guarantees if c.chance is None}
         self.known: dict[str, Finding] = {}
         self.claims = {claim.name: claim for claim in claims(node)}
         self.answer: Realizability | None = None
@@ -212,7 +219,7 @@ class _Analysis:
             return self._fails_somewhere({}, clause.formula, "every input meets it: it assumes nothing", "")
         finding = self._fails_somewhere(
             self.assumptions,
-            clause.formula,
+            clause.spoken,
             "it holds of all inputs and outputs: it demands nothing",
             "it follows from {}: it demands nothing of any output",
         )
@@ -221,6 +228,9 @@ class _Analysis:
         return replace(finding, because=self._if_refuted("assumptions-satisfiable"))
 
     def _not_vacuous(self, name: str) -> Finding:
+        if (chance := self.node.clause(name).chance) is not None:
+            together = {**self.assumptions, **self.guarantees, "its condition": chance.given, name: chance.claim}
+            return self._possible(together, "{} cannot hold together", "{} cannot hold")
         impossible = []
         undecided: Finding | None = None
         broken = self._example(f"not-tautological-{name}")  # a guarantee is broken only if its condition holds

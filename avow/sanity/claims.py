@@ -30,7 +30,7 @@ from avow.base.files import sha256
 from avow.base.records import dataclass
 from avow.base.remembered import Shelf, by_identity
 from avow.formulas.conditions import conditions
-from avow.formulas.formula import conjunction, digest, meaning, node_digest, sort_digest
+from avow.formulas.formula import clause_digest, conjunction, free_variables, meaning, node_digest, sort_digest
 from avow.language.contract import Clause, ClauseKind, Contract, Node, Port
 from avow.language.definitions import show_clause
 from avow.language.printer import show_term
@@ -111,7 +111,8 @@ def claims(node: Node) -> tuple[Claim, ...]:
     ask(Property.REALIZABLE, None, sentence, answered, assumed + guaranteed)
     for clause in (c for c in node.guarantees if c.pace is None and not c.unwritten):
         ask_of(clause)
-    for port in () if node.unwritten else node.outputs:
+    likely = {v.name for c in node.guarantees if c.chance is not None for v in free_variables(c.spoken)}
+    for port in () if node.unwritten else (p for p in node.outputs if p.name not in likely):
         excluded = f"The guarantees of {node.name} exclude some value of out.{port.name}."
         ask(Property.CONSTRAINED, port, excluded, g, guaranteed)
         ask(Property.DETERMINED, port, f"The inputs of {node.name} determine out.{port.name}.", g, guaranteed)
@@ -123,7 +124,7 @@ def claims(node: Node) -> tuple[Claim, ...]:
 @by_identity(20_000)
 def node_key(node: Node) -> str:
     """SHA-256 of everything that the answers depend on: clauses by name and meaning, ports by name and sort."""
-    clauses = sorted([str(c.kind), c.name, digest(c.formula)] for c in node.clauses)  # their order does not matter
+    clauses = sorted([str(c.kind), c.name, clause_digest(c)] for c in node.clauses)  # their order does not matter
     ports = [[p.declared, sort_digest(p.sort)] for p in (*node.inputs, *node.outputs)]
     return sha256(json.dumps([clauses, ports]))
 
@@ -147,6 +148,9 @@ def _of_clause(node: Node, clause: Clause) -> dict[Property, str]:
     else:
         whose, others, out = f"Assumption {clause.name} of {node.name}", node.assumptions, "some input"
     asked = {Property.NOT_TAUTOLOGICAL: f"{whose} rules {out} out."}
+    if clause.chance is not None:
+        asked[Property.NOT_VACUOUS] = f"What guarantee {clause.name} of {node.name} gives a probability of can happen."
+        return asked
     if clause.kind is ClauseKind.GUARANTEE and triggers(clause.formula):
         asked[Property.NOT_VACUOUS] = f"What triggers guarantee {clause.name} of {node.name} can happen."
     if len(others) > 1:

@@ -66,7 +66,9 @@ def _promised(node: Node, name: str | None = None) -> Iterator[str]:
     """The guarantees of a node, all of them or one clause, and its assumptions."""
     guarantees = [g for g in node.guarantees if name in (None, g.name)]
     for clause in (*guarantees, *(node.assumptions if guarantees else ())):
-        yield repr((node.name, clause.name, " ".join((clause.sentence or "").split()), show_term(clause.formula)))
+        likely = clause.chance and (str(clause.chance.least), clause.chance.per_run)
+        said = (" ".join((clause.sentence or "").split()), show_term(clause.spoken), *(likely or ()))
+        yield repr((node.name, clause.name, *said))
 
 
 def _placed(node: Node, plan: Plan) -> Iterator[str]:

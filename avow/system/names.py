@@ -90,6 +90,7 @@ def _environment(plan: Plan, root: Piece, nodes: dict[str, Node]) -> Iterator[Di
 
 def _requirements(plan: Plan, root: Piece, nodes: dict[str, Node]) -> Iterator[Diagnostic]:
     goals = [*(goal.name for goal in plan.compose), *(subsystem.name for subsystem in plan.subsystems)]
+    likely = {f"{n.name}.{g.name}" for n in nodes.values() for g in n.guarantees if g.chance is not None}
     for name, _, requirement in root.keyed("requirements"):
         for item in requirement.each("supported_by"):
             owner, dot, _ = item.text.partition(".")
@@ -99,6 +100,10 @@ def _requirements(plan: Plan, root: Piece, nodes: dict[str, Node]) -> Iterator[D
             known = [f"{n}.{g.name}" for n in nodes for g in nodes[n].guarantees if n == owner or owner not in nodes]
             if item.text not in known:
                 yield _unknown(where, item.text, known if owner in nodes else [*nodes, *goals, *known], item.span)
+            elif item.text in likely and (requirement.at("formula") or requirement.at("temporal")):
+                message = f"{where}: {item.text} holds with a probability, and no proof of a formula may use it"
+                hint = "leave it out here, or leave out the formula and argue the requirement"
+                yield Diagnostic("PLAN141", message, item.span, hint=hint)
 
 
 def _assumptions(plan: Plan, root: Piece) -> Iterator[Diagnostic]:

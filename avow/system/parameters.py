@@ -186,7 +186,9 @@ def with_values(
         return expand(body, [values[v] for v in spoken], term.span) if spoken else term
 
     def clause(old: Clause) -> Clause:
-        return replace(old, formula=put(old.formula), written=None if old.written is None else put(old.written))
+        chance = old.chance and replace(old.chance, claim=put(old.chance.claim), given=put(old.chance.given))
+        written = None if old.written is None else put(old.written)
+        return replace(old, formula=put(old.formula), written=written, chance=chance)
 
     kept = [c for c in node.assumptions if c.name not in {port.constancy.name for port in fixed} & node.implied]
     assumptions: list[Clause] = []

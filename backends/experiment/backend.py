@@ -12,7 +12,7 @@ from avow.backend_kit.protocol import Backend, Job, Limits, Opens, Report
 from avow.base.codec import document
 from avow.base.codes import Catalogue
 from avow.base.diagnostics import Diagnostic, Rejected
-from avow.base.verdict import Link, Object, Verdict
+from avow.base.verdict import Link, Object, Outcome, Verdict
 from avow.language.contract import Clause, Node
 
 from .campaign import NotMade, drawn, experiment, recorded, regressions
@@ -30,6 +30,7 @@ class ExperimentBackend(Backend):
     version = "11"
     strength = Verdict.TESTED
     remembers = True
+    chances = True
     uses_scenario = False
     uses_criticality = True
     uses_wiring = False
@@ -79,10 +80,15 @@ class ExperimentBackend(Backend):
             found = read(job)
         except Rejected:
             return {}
-        claim = _claim(job) | {
-            "conditions": {name: [c.name for c in claim.conditions] for name, claim in found.claims.items()},
-            "least success rate": str(found.at_least or found.floor),
-        }
+        chances = {o.name: str(c.least) for o in job.obligations if (c := job.clause(o).chance) is not None}
+        claim = (
+            _claim(job)
+            | ({"probabilities": chances} if chances else {})
+            | {
+                "conditions": {name: [c.name for c in claim.conditions] for name, claim in found.claims.items()},
+                "least success rate": str(found.at_least or found.floor),
+            }
+        )
         return {"claim.json": document(claim) + "\n"}
 
     def discharge(self, job: Job, folder: Path, limits: Limits) -> Report:
@@ -98,6 +104,9 @@ class ExperimentBackend(Backend):
             return Report.alike(job, Verdict.ERROR, why, "avow experiment", self.version)
         outcomes, logs = [], {}
         for o in job.obligations:
+            if campaign is not None and job.clause(o).chance is not None:
+                outcomes.append(Outcome(o.id, Verdict.UNKNOWN, _MONITORS))
+                continue
             outcome, logs[f"{o.name}.tsv"] = settle(o.name, found, job.kept.get(o.id, ()))
             # the meaning of a part of the contract in terms of columns is a person's judgement
             link = Link.GUIDED if found.claims[o.name].interpreted else self.link
@@ -105,6 +114,9 @@ class ExperimentBackend(Backend):
             outcomes.append(replace(outcome, obligation=o.id, link=link, of=of))
         beyond = contradictions(job, found) if campaign is None else of_campaign(job, campaign, found)
         return Report(tuple(outcomes), "avow experiment", self.version, logs=logs, contradicted=tuple(beyond))
+
+
+_MONITORS = "the monitors of a campaign judge no probability: give a table of steps under 'data', without 'campaign'"
 
 
 def _campaign(job: Job) -> Campaign | None:

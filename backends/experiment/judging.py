@@ -17,7 +17,8 @@ from avow.formulas.temporal.cells import Records
 from avow.formulas.temporal.responses import due, pending, responding
 from avow.formulas.traversal import transform
 from avow.formulas.values import Value
-from avow.language.contract import Clause
+from avow.kernel.rates import Trial
+from avow.language.contract import Chance, Clause
 from avow.language.operators import definition
 from avow.language.printer import show_term
 from avow.language.sorts import BOOL, FunctionSort
@@ -68,6 +69,15 @@ class Claim:
     """A response whose time is not over is missing; None if the guarantee is no response with a limit."""
     interpreted: tuple[str, ...]
     """The texts of the interpretations that it, or an assumption, needs."""
+    chance: Chance | None = None
+    """Of a guarantee with a probability."""
+
+    @property
+    def trial(self) -> Trial | None:
+        """What the probability is of; None if the guarantee has none."""
+        if self.chance is None:
+            return None
+        return Trial.RUN if self.chance.per_run else Trial.STEP
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,24 +100,28 @@ class Judged:
 
 
 def claim(clause: Clause, assumptions: Iterable[Clause], meanings: Iterable[Interpretation], known: set[str]) -> Claim:
-    """`known`: the names of ports and columns that have values."""
+    """`known`: the names of ports and columns that have values. The trials of a guarantee with a probability are those
+    that meet what is given, and no others are left out."""
     known_meanings, records = tuple(meanings), Records()
 
     def ready(name: str, formula: Term) -> Formula:
         return Formula.made(name, records.clause(formula) if histories(formula) else formula)
 
     assumptions = tuple(assumptions)
-    formulas = (clause.formula, *(each.formula for each in assumptions))
-    formula = interpreted(clause.formula, known_meanings)
+    formulas, chance = (clause.spoken, *(each.formula for each in assumptions)), clause.chance
+    formula = interpreted(clause.spoken, known_meanings)
     assumed = {each.name: interpreted(each.formula, known_meanings) for each in assumptions}
     waiting = pending(formula) if (found := responding(formula)) and found[2].operator is not Past.UNTIL else None
     unseen = [name for name, term in assumed.items() if not _ports(term) <= known]
     judged_terms = (formula, *(term for name, term in assumed.items() if name not in unseen))
     waits = None if waiting is None else Formula.made(clause.name, records.term(waiting))
+    asked = _conditions(formula, assumed) if chance is None else ()
+    if chance is not None and chance.given != TRUE:
+        asked = (interpreted(chance.given, known_meanings),)
     return Claim(
         ready(clause.name, formula),
-        tuple(ready(_named(condition, formula), condition) for condition in _conditions(formula, assumed)),
-        _demands(formula),
+        tuple(ready(_named(condition, formula), condition) for condition in asked),
+        _demands(formula) if chance is None else None,
         tuple(ready(name, term) for name, term in assumed.items() if name not in unseen),
         tuple(unseen),
         tuple(sorted(_ports(formula) - known)),
@@ -116,6 +130,7 @@ def claim(clause: Clause, assumptions: Iterable[Clause], meanings: Iterable[Inte
         tuple(records.cells),
         waits,
         tuple(one.text for one in known_meanings if any(interpreted(each, [one]) != each for each in formulas)),
+        chance,
     )
 
 

@@ -16,7 +16,7 @@ from avow.base.records import dataclass
 from avow.base.verdict import Counterexample, Outcome, Verdict
 from avow.evidence.record import CASE, RATE
 from avow.formulas.values import show
-from avow.kernel.rates import Stratum
+from avow.kernel.rates import Stratum, Trial, shows
 
 from .binding import Unfit
 from .judging import Claim, Judged, judged
@@ -42,6 +42,10 @@ class _Sample:
     @property
     def bound(self) -> Fraction:
         return Fraction(self.worst.bound)
+
+    def refutes(self, least: Fraction) -> bool:
+        """Whether some stratum shows, at its confidence, that the probability of success is at most `least`."""
+        return any(shows(s.trials - s.failures, s.trials, least, Fraction(s.confidence)) for s in self.strata)
 
 
 def settle(name: str, experiment: Experiment, kept: Iterable[Sequence[Mapping[str, Any]]]) -> tuple[Outcome, str]:
@@ -70,17 +74,22 @@ def _outcome(claim: Claim, found: Sequence[tuple[Run, Judged]], experiment: Expe
     bound["failure probability at most"] = float(sample.bound)
     seen = _seen(sample, len(found))
     text = f"{seen}: {_most(sample, experiment)}"
-    claimed = experiment.at_least is not None and sample.bound <= 1 - experiment.at_least
-    if sample.failed and not claimed:
+    at_least, chance = experiment.at_least, claim.chance
+    if chance is not None:
+        at_least = chance.least
+        if why := _unlike(claim, experiment):
+            return replace(outcome, summary=why)
+    claimed = at_least is not None and sample.bound <= 1 - at_least
+    if sample.failed and not claimed and (chance is None or sample.refutes(chance.least)):
         return _failed(replace(outcome, summary=seen), claim, sample.failed)
     if undecided := [(run, one) for run, one in found if one.undecided and not one.excused]:
         run, one = undecided[0]
         return replace(outcome, summary=f"run {run.name} is undecided: {one.undecided}")
     if why := _unmet(claim, found):
         return replace(outcome, verdict=Verdict.TESTED, vacuous=True, summary=why)
-    asked = experiment.at_least or experiment.floor
+    asked = at_least or experiment.floor
     if sample.bound > 1 - asked:
-        return replace(outcome, summary=_too_few(text, sample, experiment, asked))
+        return replace(outcome, summary=_too_few(text, sample, claim, experiment, asked))
     details[RATE] = [_row(stratum) for stratum in sample.strata]
     rests = [_DRAWN if experiment.replayed is None else _SIMULATED, *claim.interpreted]
     if claim.unseen:
@@ -90,8 +99,20 @@ def _outcome(claim: Claim, found: Sequence[tuple[Run, Judged]], experiment: Expe
         rests.append(f"no answer would be late in runs that end before one is due: {names}")
     if sample.failed:
         details["failing runs"] = counterexample(claim, sample.failed).explanation
-        rests.append(f"the guarantee is meant statistically: in at least {_percent(asked)} of runs")
+        if chance is None:
+            rests.append(f"the guarantee is meant statistically: in at least {_percent(asked)} of runs")
     return replace(outcome, verdict=Verdict.TESTED, summary=text, hypotheses=tuple(rests))
+
+
+def _unlike(claim: Claim, experiment: Experiment) -> str:
+    """Why the trials of the data are not what the guarantee gives a probability of; empty if they are."""
+    if claim.trial in (None, experiment.trial):
+        return ""
+    if experiment.trial is Trial.RUN:
+        return (
+            "the guarantee has a probability per step, and the data's trials are runs: leave 'steps' out, one row a run"
+        )
+    return "the guarantee has a probability per run, and each row is one step: the rows of a run need 'steps: true'"
 
 
 _DRAWN = "the runs are independent and drawn as the robot will be used"
@@ -119,7 +140,7 @@ def _replayed(outcome: Outcome, name: str, claim: Claim, experiment: Experiment)
     if failed := [(run, one) for run, one in found if one.broken is not None]:
         names = listed([run.name for run, _ in failed], FAILURES_SHOWN)
         outcome = replace(outcome, summary=f"{text}, {len(failed)} failed: {names}")
-        if experiment.at_least is None:
+        if experiment.at_least is None and claim.chance is None:
             return _failed(outcome, claim, failed)
         rests = f"the guarantee is meant statistically: it fails in the regressions {names}"
         return replace(outcome, hypotheses=(*outcome.hypotheses, rests))
@@ -191,9 +212,10 @@ def _most(sample: _Sample, experiment: Experiment) -> str:
     return f"{most} ({which}, {worst.failures} of {worst.trials} failed)"
 
 
-def _too_few(text: str, sample: _Sample, experiment: Experiment, asked: Fraction) -> str:
+def _too_few(text: str, sample: _Sample, claim: Claim, experiment: Experiment, asked: Fraction) -> str:
     needed = runs_needed(1 - asked, Fraction(sample.worst.confidence))
-    what = "the claim" if experiment.at_least is not None else "the least that this criticality asks for"
+    claimed = claim.chance is not None or experiment.at_least is not None
+    what = "the claim" if claimed else "the least that this criticality asks for"
     where = " in each stratum" if len(sample.strata) > 1 else ""
     enough = f"{needed} runs without a failure{where} would" if needed is not None else "very many runs would"
     return f"{text}; success in {_percent(asked)} of runs, {what}, is not shown: {enough}"

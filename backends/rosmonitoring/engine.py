@@ -108,7 +108,7 @@ class Monitor:
         spoken = (v.qualified for a in self.setup.node.assumptions for v in free_variables(a.formula))
         self.assumed = tuple(dict.fromkeys(name for name in spoken if name in self.setup.rules))
         node = self.setup.node
-        written = (c.name for c in node.guarantees if not c.unwritten)
+        written = (c.name for c in node.guarantees if not c.unwritten and c.chance is None)
         wanted = set(written if self.guarantees is None else self.guarantees)
         watched = [c for c in node.clauses if c.kind is ClauseKind.ASSUMPTION or c.name in wanted]
         self.word = word_of(self.setup, watched)

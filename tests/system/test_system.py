@@ -170,6 +170,14 @@ def test_every_code_is_declared_and_triggered() -> None:
     assert {code for code in declared if code not in tests} <= indirectly | {"PLAN126"}
 
 
+def test_no_proof_may_use_a_guarantee_with_a_probability(tmp_path: Path) -> None:
+    rcl = "node n { inputs( p : BOOL ) outputs( d : BOOL ) topics()\n guarantee g with probability >= 0.9 ( out.d ) }"
+    argued, proved = "R: {text: t, supported_by: [n.g]}", "R: {text: t, formula: n.d, supported_by: [n.g]}"
+    make(tmp_path, rcl, f"requirements: {{{argued}}}")
+    (found,) = faults(tmp_path, rcl, f"requirements: {{{proved}}}")
+    assert (found.code, found.span and found.span.column) == ("PLAN141", proved.index("n.g") + 16)
+
+
 # -- graphs ------------------------------------------------------------------------------------------------------------
 
 
