@@ -38,6 +38,7 @@ _NEEDS = {
     "needs_dds": lambda: all(map(importlib.util.find_spec, ("cyclonedds", "rosbags"))),
     "needs_dot": lambda: shutil.which("dot") is not None,
     "needs_motion": lambda: importlib.util.find_spec("codac") is not None,
+    "needs_chance": lambda: importlib.util.find_spec("stormpy") is not None,
     "needs_perception": lambda: all(map(importlib.util.find_spec, ("maraboupy", "onnx", "onnxruntime"))),
     "needs_ros1": lambda: _runs("/usr/bin/python3", "-c", "import diagnostic_msgs, rosmaster, rospy"),
     "needs_roscpp": lambda: shutil.which("g++") is not None and _runs("pkg-config", "--exists", "roscpp"),

@@ -129,7 +129,7 @@ def _no_chance(tool: Backend, node: Node, clause: Clause) -> str | None:
     if clause.chance is None or tool.chances:
         return None
     about = f"{node.name}.{clause.name}"
-    return f"{tool.name} shows no probability, as {about} has it: recorded steps do, with the method experiment"
+    return f"{tool.name} shows no probability, as {about} has it: recorded steps (experiment) or a model (storm) do"
 
 
 def _refusal(tool: Backend, node: Node, clause: Clause) -> str | None:

@@ -22,6 +22,7 @@ from avow.backends.reach import BACKEND as REACH
 from avow.backends.review import BACKEND as REVIEW
 from avow.backends.review.stamp import stamp
 from avow.backends.rosmonitoring import BACKEND as ROSMONITORING
+from avow.backends.storm import BACKEND as STORM
 from avow.base.verdict import Verdict
 from avow.conformance import Conformance, Seeded
 
@@ -322,6 +323,35 @@ class TestReach(Conformance):
             ("right", "ode", "v", "-a", {"horizon": 1.2, "step": 0.05}, both(Verdict.CHECKED)),
             ("wrong", "ode", "v", "-a/2", {"horizon": 1.2, "step": 0.05}, one_refuted(Verdict.CHECKED)),
             ("inductive", "map", "0.9 * x + v / 100", "v/2 - a/100", {}, both(Verdict.PROVED)),
+        )
+    )
+
+
+CHAIN = """\
+dtmc
+module n
+  x : [0..2] init 0;
+  r : [100..130] init 100;
+  [] true -> 0.9 : (x'=1) & (r'=LOW) + 0.1 : (x'=2) & (r'=130);
+endmodule
+formula high = x = 2;
+"""
+
+
+class TestStorm(Conformance):
+    backend = STORM
+    seeded = tuple(
+        Seeded(
+            name,
+            CONTRACT,
+            {"model": "node.prism", "ports": {"in.r": "r", "out.high": "high"}},
+            verdicts,
+            {"node.prism": CHAIN.replace("LOW", low)},
+            SCENARIO,
+        )
+        for name, low, verdicts in (
+            ("right", "110", both(Verdict.CHECKED)),
+            ("wrong", "125", one_refuted(Verdict.CHECKED)),
         )
     )
 
