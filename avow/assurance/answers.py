@@ -223,7 +223,8 @@ class WeakestEvidence:
     @property
     def brief(self) -> str:
         """``navigation.stays, tested, bound 13 %``."""
-        return ", ".join(part for part in (short(self.claim), self.status, self.bound) if part)
+        name = short(self.claim).removeprefix("system/requirement/")
+        return ", ".join(part for part in (name, self.status, self.bound) if part)
 
     @property
     def others(self) -> str:

@@ -279,7 +279,8 @@ def _sampled(stratum: Json) -> bool:
 def _short(view: Json) -> str:
     """A claim as the page names it, if that is no sentence."""
     o = view["obligation"]
-    return f"{o['node']}.{o['name']}" if o["kind"] == "guarantee" else f"{o['node']}/{o['kind']}/{o['name']}"
+    own = f"{o['node']}.{o['name']}" if o["kind"] == "guarantee" else f"{o['node']}/{o['kind']}/{o['name']}"
+    return own.removeprefix("system/requirement/")
 
 
 def _weakness(record: Json) -> tuple[int, float]:
