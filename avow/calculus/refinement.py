@@ -110,7 +110,8 @@ def refines(
     faults = _ports(concrete, abstract)
     if faults:
         return Refinement(concrete.name, abstract.name, faults, ())
-    concrete, abstract = _of_same_ports(concrete, abstract)
+    always = tuple(replace(g, formula=g.spoken) for g in abstract.guarantees)
+    concrete, abstract = _of_same_ports(concrete, replace(abstract, guarantees=always))
     answers, certificates = _answered(concrete, abstract, bounds)
     clauses = [(concrete.name, c) for c in concrete.assumptions] + [(abstract.name, c) for c in abstract.guarantees]
     demands = tuple(_demand(concrete, *asked, answer) for asked, answer in zip(clauses, answers, strict=True))
@@ -119,6 +120,9 @@ def refines(
 
 
 def _demand(concrete: Node, node: str, clause: Clause, answer: Answer) -> Demand:
+    if clause.chance is not None and answer.verdict is not Verdict.PROVED:  # it need not always hold
+        why = f"probabilities are not compared, and {concrete.name} does not show that {clause.name} always holds"
+        return Demand(node, clause, Verdict.UNKNOWN, (), None, why, False)
     needed = tuple(map(str, answer.details.get("needed", ())))  # type: ignore[call-overload]
     vacuous = answer.vacuous or (answer.established is not None and answer.established.vacuous)
     shown = answer.counterexample

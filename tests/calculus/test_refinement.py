@@ -286,3 +286,18 @@ def test_what_is_proved_the_kernel_has_established(monkeypatch: pytest.MonkeyPat
     assert hows <= {How.SHOWN, How.GUARANTEE, How.ENVIRONMENT}
     monkeypatch.setattr(Certificates, "requirement", lambda *_: None)
     assert refines(only(stronger), only(BASE)).verdict is Verdict.UNKNOWN
+
+
+@pytest.mark.parametrize(
+    ("own", "verdict"),
+    [
+        ("guarantee g ( in.p -> out.d )", Verdict.PROVED),
+        ("guarantee g ( in.p or out.d )", Verdict.UNKNOWN),
+        ("guarantee g with probability >= 0.9 given ( in.p ) ( out.d )", Verdict.UNKNOWN),
+    ],
+)
+def test_a_probability_is_refined_by_what_always_holds(own: str, verdict: Verdict) -> None:
+    text = "node {} {{ inputs( p : BOOL ) outputs( d : BOOL ) topics() {} }}"
+    one = only(text.format("a", own))
+    other = only(text.format("b", "guarantee h with probability >= 0.9 given ( in.p ) ( out.d )"))
+    assert refines(one, other).verdict is verdict
