@@ -14,7 +14,7 @@ from avow.base.codec import LATER, Unreadable, from_json
 from avow.base.plain import count, decimal, listed
 from avow.base.records import dataclass
 from avow.base.verdict import Verdict
-from avow.evidence.record import COMPOSES, RATE, Evidence
+from avow.evidence.record import COMPOSES, LIKELY, RATE, Evidence
 from avow.evidence.status import Status, weigh
 from avow.kernel.check import Refused
 from avow.kernel.rates import Leaf, Stratum, Trial, composed
@@ -89,7 +89,8 @@ def rate_of(own: Iterable[str], claims: Iterable[str], views: Mapping[str, Oblig
         if (view := views.get(name)) is None:
             continue
         samples = [s for record in view.records if weigh(record).support is not None and (s := sample(record))]
-        if view.status in _SAMPLED or any(stratum.failures for strata in samples for stratum in strata):
+        likely = any(LIKELY in record.details for record in view.records)
+        if likely or view.status in _SAMPLED or any(stratum.failures for strata in samples for stratum in strata):
             if samples:
                 leaves.append(Leaf(name, max(samples, key=lambda strata: max(Fraction(s.bound) for s in strata))))
             else:

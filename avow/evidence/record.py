@@ -33,6 +33,9 @@ ISOLATION = "isolation"
 RATE = "rate"
 """Among the details of a sample: its strata (`avow.kernel.rates.Stratum`), from which rates are composed."""
 
+LIKELY = "least probability"
+"""Among the details of evidence that counts no trials, for a guarantee with a probability: its bound."""
+
 COMPOSES = "composes"
 """Among the details of a requirement's proof: the samples that its failure rate may be composed of
 (`avow.calculus.trials`)."""

@@ -18,6 +18,7 @@ from avow.base import process
 from avow.base.files import write
 from avow.base.plain import count, decimal
 from avow.base.verdict import Counterexample, Outcome, Verdict
+from avow.evidence.record import LIKELY
 from avow.language.contract import Clause
 
 from .options import Given
@@ -107,7 +108,8 @@ def _outcome(
         vacuous = asked.least is not None and not answer["met"]
         rests = ("the model has the probabilities and choices of the node in its use",)
         summary = f"{text}; no state meets what is given" if vacuous else text
-        return Outcome(name, Verdict.CHECKED, summary, bound=bound, hypotheses=rests, vacuous=vacuous)
+        details: dict[str, object] = {} if chance is None else {LIKELY: str(chance.least)}
+        return Outcome(name, Verdict.CHECKED, summary, bound=bound, hypotheses=rests, vacuous=vacuous, details=details)
     return Outcome(name, Verdict.REFUTED, text, _counterexample(clause, answer, first, states, number), bound=bound)
 
 

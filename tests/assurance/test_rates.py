@@ -15,7 +15,7 @@ from avow.assurance.rates import misstated
 from avow.base.codec import from_json, to_json
 from avow.base.verdict import Verdict
 from avow.evidence.obligation import Kind
-from avow.evidence.record import COMPOSES, RATE, Evidence
+from avow.evidence.record import COMPOSES, LIKELY, RATE, Evidence
 from avow.report.explained import explained
 from avow.report.short import terminal_lines
 from avow.system.plan import Requirement
@@ -73,9 +73,15 @@ def test_of_two_samples_of_a_claim_the_worse_counts() -> None:
     assert requirement.rate.bound == "0.372"
 
 
-@pytest.mark.parametrize("method", ["hypothesis", "rosmonitoring"])
-def test_a_leaf_that_is_sampled_without_a_rate_leaves_none(method: str) -> None:
-    other = evidence("c.g", Verdict.TESTED if method == "hypothesis" else Verdict.MONITORED, method)
+@pytest.mark.parametrize(
+    "other",
+    [
+        evidence("c.g", Verdict.TESTED, "hypothesis"),
+        evidence("c.g", Verdict.MONITORED, "rosmonitoring"),
+        evidence("c.g", Verdict.CHECKED, "storm", details={LIKELY: "9/10"}),
+    ],
+)
+def test_a_leaf_without_a_counted_rate_leaves_none(other: Evidence) -> None:
     requirement = three(sampled("a.g"), sampled("b.g"), other).requirements[0]
     assert requirement.rate is not None
     assert not requirement.rate.bound
