@@ -122,6 +122,7 @@ _SHOWN = {
     *(("Claim", name) for name in ("sentence", "formula", "severity", "clauses")),
     ("Port", "type_name"),
     ("Port", "unit"),  # the formulas' units are checked where the contract is loaded
+    ("Literal", "unit"),
     ("EnumSort", "name"),
     *(("Plan", name) for name in ("system", "title")),
     *(("NodePlan", name) for name in ("criticality", "title")),
