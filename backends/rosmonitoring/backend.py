@@ -69,9 +69,9 @@ class RosMonitoringBackend(Backend):
         from avow.ros.bags import digest_trace
 
         from .memory import unmonitored
-        from .notes import readings
+        from .notes import readable, readings, unheard
         from .observing import outside
-        from .options import setup
+        from .options import origin, setup
         from .overhead import overheads
 
         found, faults = setup(job.system, job.node, job.method.options)
@@ -90,6 +90,8 @@ class RosMonitoringBackend(Backend):
                 message = f"traces: {name!r} is not the recording that the plan names: its digest is {there}"
                 hint = "put the recording there, or write this digest if it is the one that is meant"
                 problems.append(Diagnostic("MON102", message, span, hint=hint))
+            elif not faults:
+                problems += [*readable(found, path, origin(job.system)), *unheard(found, path, job.system)]
             for _, wrong, hint in unknown_outside(job.node, outside(job.method.options, name)):
                 problems.append(Diagnostic("MON101", f"traces: outside: {wrong}", span, hint=hint))
         bags = not any(name.endswith(".jsonl") for name in _traces(job))  # whose messages have their types' fields only

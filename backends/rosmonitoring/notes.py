@@ -9,13 +9,16 @@ from typing import assert_never
 
 from avow.base.diagnostics import Diagnostic, Severity, Span
 from avow.base.graphs import reached
+from avow.base.suggestions import nearest
 from avow.formulas.formula import free_variables
 from avow.language.terms import Role
 from avow.ros.bags import Carried, Origin, is_bag
 from avow.ros.calls import is_service_part
 from avow.ros.definitions import Definitions, Message, canonical
+from avow.system.plan import System
+from avow.system.topics import whole_name
 
-from .options import Setup, same_topic
+from .options import Setup, origin, same_topic
 from .reading import shown
 from .rules import Choice, Constant, Fields, Previous, Rule
 from .traces import carried
@@ -45,6 +48,21 @@ def readable(setup: Setup, path: Path, where: Origin) -> tuple[Diagnostic, ...]:
         return (Diagnostic("MON206", text, hint="publish what is called and answered, or write a JSON trace"),)
     types = {topic: kinds[same_topic(topic)] for topic in found.types if same_topic(topic) in kinds}
     return tuple(_conflicts(path, found, setup.known, types))
+
+
+def unheard(setup: Setup, path: Path, system: System) -> Iterator[Diagnostic]:
+    """The node's topics that a bag does not have, if it has one of nearly that name that no node has."""
+    if not is_bag(path):
+        return
+    found = {same_topic(topic) for topic in carried(path, origin(system)).types}
+    known = {whole_name(system.plan.ros.names, node, t) for node in system.contract.nodes for t in node.topics}
+    others = sorted(f"/{topic}" for topic in found - {same_topic(name) for name in known})
+    spans = {t.port.variable.qualified: t.span for t in setup.node.topics if t.port is not None}
+    for name, rule in setup.carried.items():
+        near = nearest(f"/{same_topic(rule.topic)}", others, alike=0.75)
+        if near and same_topic(rule.topic) not in found and name in spans:
+            text = f"{path.name} has no message on {rule.topic}"
+            yield Diagnostic("MON208", text, spans[name], Severity.WARNING, f"did you mean `{near[0]}`?")
 
 
 def _conflicts(path: Path, found: Carried, known: Definitions, types: Mapping[str, str]) -> Iterator[Diagnostic]:

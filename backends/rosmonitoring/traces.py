@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import gc
 import json
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -209,8 +210,15 @@ def chunks(more: Callable[[int], bytes], name: str) -> Iterator[bytes]:
 
 def carried(path: Path, origin: Origin = NOWHERE) -> Carried:
     """As `avow.ros.bags.carried`. Raises Rejected."""
+    files = sorted(path.iterdir()) if path.is_dir() else [path]
     with opened():
-        return bags.carried(path, origin)
+        return _carried(path, origin, tuple((file.name, file.stat().st_mtime_ns) for file in files if file.is_file()))
+
+
+@functools.lru_cache(maxsize=8)
+def _carried(path: Path, origin: Origin, _stamps: tuple[tuple[str, int], ...]) -> Carried:
+    """Several nodes name one bag: it is opened once, until its files change."""
+    return bags.carried(path, origin)
 
 
 @contextmanager

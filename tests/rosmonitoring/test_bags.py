@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from fractions import Fraction
 from pathlib import Path
@@ -10,7 +11,7 @@ from typing import Any
 import pytest
 
 from avow.backends.rosmonitoring.engine import Monitor
-from avow.backends.rosmonitoring.notes import readable
+from avow.backends.rosmonitoring.notes import readable, unheard
 from avow.backends.rosmonitoring.options import known_types, origin, setup
 from avow.backends.rosmonitoring.pairing import time_of
 from avow.backends.rosmonitoring.session import session
@@ -32,7 +33,13 @@ CUSTOM = "std_msgs/Header header\nfloat32 level\nstring note\n"
 
 
 def write_bag(
-    path: Path, form: str, kind: str, values: list[dict[str, Any]], definition: str = "", start: int = 0
+    path: Path,
+    form: str,
+    kind: str,
+    values: list[dict[str, Any]],
+    definition: str = "",
+    start: int = 0,
+    topic: str = "/v",
 ) -> Path:
     """A bag of one topic /v, a message a second after `start` nanoseconds; `form`: ros1, sqlite3 or mcap."""
     path = path.with_suffix(".bag") if form == "ros1" else path
@@ -57,13 +64,13 @@ def write_bag(
 
     if form == "ros1":
         with Writer1(path) as writer:
-            connection = writer.add_connection("/v", kind, typestore=store)
+            connection = writer.add_connection(topic, kind, typestore=store)
             for k, fields in enumerate(values, start=1):
                 writer.write(connection, start + k * 10**9, store.serialize_ros1(message(fields), kind))
     else:
         plugin = StoragePlugin.MCAP if form == "mcap" else StoragePlugin.SQLITE3
         with Writer2(path, version=9, storage_plugin=plugin) as writer2:
-            connection2 = writer2.add_connection("/v", kind, typestore=store)
+            connection2 = writer2.add_connection(topic, kind, typestore=store)
             for k, fields in enumerate(values, start=1):
                 writer2.write(connection2, start + k * 10**9, store.serialize_cdr(message(fields), kind))
     return path
@@ -168,3 +175,17 @@ def test_a_bag_without_definitions_wants_the_distribution(
         assert "ros: {distro: humble}" in str(caught.value.diagnostics[0].hint)
     else:
         assert judge(system, bag) == [Fraction(5, 2)]
+
+
+@pytest.mark.parametrize(
+    ("topic", "told"), [("/brush/setpiont", ["MON208"]), ("/brush/setpoint", []), ("/elsewhere", [])]
+)
+def test_a_topic_of_nearly_the_recorded_name_is_named(
+    topic: str, told: list[str], make_system: Callable[..., System], tmp_path: Path
+) -> None:
+    bag = write_bag(tmp_path / "run", "mcap", "std_msgs/msg/Float64", [{"data": 1.0}], topic="/brush/setpoint")
+    system = make_system(re.sub(r"/?\bv matches", f"{topic} matches", RCL.format(kind="std_msgs/Float64")))
+    found, _ = setup(system, system.contract.node("n"), system.plan.node("n").methods[0].options)
+    warned = list(unheard(found, bag, system))
+    assert [d.code for d in warned] == told
+    assert all(d.span is not None and d.hint == "did you mean `/brush/setpoint`?" for d in warned)
