@@ -11,6 +11,7 @@ import click
 from avow.base.codec import document
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.files import write
+from avow.base.suggestions import suggest
 from avow.base.workspace import find_workspace
 from avow.cli.options import PathArgument, json_option
 from avow.ros.sources import DISTRIBUTIONS
@@ -51,9 +52,11 @@ def command(
     drafted = bag is not None or graph is not None
     if drafted and template is not None:
         raise click.UsageError("a draft has no template: leave --template out")
-    if distro is not None and (not drafted or distro not in DISTRIBUTIONS):
-        known = ", ".join(DISTRIBUTIONS)
-        raise click.UsageError(f"--distro goes with --from-bag or --from-graph, and is one of {known}")
+    if distro is not None and not drafted:
+        raise click.UsageError("--distro goes with --from-bag or --from-graph")
+    if distro is not None and distro not in DISTRIBUTIONS:
+        hint = suggest(distro, DISTRIBUTIONS) or f"known: {', '.join(DISTRIBUTIONS)}"
+        raise click.UsageError(f"--distro: there is no distribution '{distro}'; {hint}")
     if drafted:
         return _drafted(directory, bag, graph, distro, as_json)
     _from_template(directory, template or "plain")

@@ -49,6 +49,10 @@ class Pipeline:
             raise SystemExit(2)
         self._state = State(Workspace(root), new_run(remote), answer=answer)
         self._wanted = wanted(asked)
+        for name in self._wanted[1:]:  # `doit verify NAME`
+            if (self._state.workspace.contracts / name).is_dir():
+                print(f"error: {name} is a system, and no task: write `doit verify:{name}`", file=sys.stderr)
+                raise SystemExit(2)
 
     def config(self) -> dict[str, Any]:
         """DOIT_CONFIG for the workspace. Exits with code 2 if the artifacts' folder cannot be written."""

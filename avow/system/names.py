@@ -206,7 +206,11 @@ def _findings(plan: Plan, root: Piece, nodes: dict[str, Node]) -> Iterator[Diagn
             if obligation is None:
                 continue
             owner, _, rest = obligation.text.partition("/")
-            if owner not in nodes and owner != "system" and not set(owner) & set("*?["):
+            meant = obligation.text.replace(".", "/guarantee/")
+            if meant in known and meant != obligation.text:
+                message = f"{key}: obligation {obligation.text!r} is no obligation's name"
+                yield Diagnostic("PLAN106", message, obligation.span, hint=f"write `{meant}`")
+            elif owner not in nodes and owner != "system" and not set(owner) & set("*?["):
                 yield _unknown(f"{key}: node", owner, [*nodes, "system"], obligation.span)
             elif not (set(obligation.text) & set("*?[") or rest.startswith(_DERIVED) or obligation.text in known):
                 yield _unknown(f"{key}: obligation", obligation.text, known, obligation.span)

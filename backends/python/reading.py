@@ -85,8 +85,9 @@ def load(job: Job) -> Reading:
         message = "Python's floats are float64: numbers: float32 is not what this source computes with"
         faults.append(Diagnostic("PYTHON100", message, source.place.at("numbers")))
     if source.kind is not Driving.STEP:
-        message = f"a class with a method step is proved, and kind is {source.kind}: `avow drive` runs callbacks"
-        faults.append(Diagnostic("PYTHON100", message, source.place.at("source", "kind")))
+        message = f"kind is {source.kind}: {source.class_name} has callbacks, and this method proves a method `step`"
+        hint = "leave this method out: `hypothesis` tests callbacks"
+        faults.append(Diagnostic("PYTHON100", message, place, hint=hint))
     path = inside(job.root, source.python)
     text, encoding, tree = "", "", None
     try:

@@ -185,6 +185,12 @@ def test_bad_input_is_located_and_ends_with_2(begun: Path, tmp_path: Path) -> No
     assert "thermostatt.imp" in text, text
 
 
+def test_a_system_in_the_place_of_a_task_is_named(begun: Path) -> None:
+    done = run(begun, "doit", "verify", "thermostat")
+    assert done.returncode == 2
+    assert "write `doit verify:thermostat`" in done.stderr
+
+
 @pytest.mark.parametrize("how", ["a copy", pytest.param("a link", marks=pytest.mark.slow)])
 def test_two_systems_of_one_name_are_mixed_up_by_nobody(begun: Path, tmp_path: Path, how: str) -> None:
     robot = Path(shutil.copytree(begun, tmp_path / "robot"))

@@ -105,6 +105,7 @@ def test_faults_of_plan_and_contract_come_together(tmp_path: Path) -> None:
         ("scenario: {domains: {in.r: 0..100000000000}}", "PLAN109", 1, "more than 100000 values", ""),
         ("scenario: {domains: {REALS: 1}}", "PLAN106", 1, "REALS", "`REAL`"),
         ("expected: [{obligation: c/sanity/x, verdict: refuted}]", "PLAN106", 1, "'c'", "a, b, system"),
+        ("expected: [{obligation: a.g1, verdict: refuted}]", "PLAN106", 1, "a.g1", "a/guarantee/g1"),
         ("expected: [{obligation: a/guarantee/g11, verdict: refuted}]", "PLAN106", 1, "g11", "a/guarantee/g1"),
         ("expected: [{obligation: a/guarante/g1, verdict: refuted}]", "PLAN106", 1, "guarante/", "a/guarantee/g1"),
         ("expected: [{obligation: system/requirement/R, verdict: refuted}]", "PLAN106", 1, "requirement/R", ""),

@@ -205,6 +205,9 @@ def driver(system: System, name: str) -> Driver:
         raise Rejected(Diagnostic("DRIVE100", f"{system.name} has no node {name!r}", hint=suggest(name, names)))
     node = system.contract.node(name)
     source = next((entry.source for entry in plan.nodes if entry.node == node.name), None)
+    if source is not None and source.cpp:
+        text = f"the program of {node.name} is C++, which is not driven"
+        raise Rejected(Diagnostic("DRIVE100", text, source.place.at("source"), hint="the method `fuzz` tests it"))
     if source is None or not source.python:
         hint = "source: {python: src/node.py, class: Node, kind: rclpy}, or kind: rospy"
         raise Rejected(Diagnostic("DRIVE100", f"the plan names no program for the node {node.name}", hint=hint))
