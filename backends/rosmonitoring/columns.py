@@ -30,7 +30,7 @@ from .pace import SEQUENCE, sequence
 from .paired import Paired
 from .pairing import ticks_at, time_of
 from .rules import Previous, heard_through
-from .traces import chunks, parsed, unread
+from .traces import Services, chunks, parsed, unread
 from .tuning import REMEMBERED, TOPICS_KEPT
 from .watched import Violation, Watched
 
@@ -310,6 +310,7 @@ class Columns:
         self._latest: object = None
         """The time of the latest event, as it is written."""
         self._line = 0
+        self._services = Services()
         self._by_arrival = any(monitor.by_arrival for monitor in monitors)
         self._one_by_one = False
         """The engine judges every event: on a running graph, answers wait for later messages."""
@@ -327,7 +328,7 @@ class Columns:
         violations found there. Lines without violations give no result, except one in each megabyte, so that the caller
         can check the clock. Raises Rejected, OSError."""
         for chunk in chunks(read, name):
-            events, lines, count, wrong = parsed(chunk, name, self._line)
+            events, lines, count, wrong = parsed(chunk, name, self._line, self._services)
             self._one_by_one = self._one_by_one or (self._by_arrival and LIVE.encode() in chunk)
             yield from self._judged(events, lines)
             self._line += count

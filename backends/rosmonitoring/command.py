@@ -144,7 +144,7 @@ def _configure(system: System, nodes: tuple[str, ...], path: Path) -> None:
 
     setups = [monitor.setup for monitor in session(system, nodes).monitors]
     _write(path, of_system([(setup, data_of(method_of(system, setup.node.name))) for setup in setups]))
-    click.echo(f"{path}: {len(setups)} monitors")
+    click.echo(f"wrote {path}")
 
 
 def _live(

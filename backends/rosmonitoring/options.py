@@ -283,13 +283,13 @@ class _Work:
         return found
 
     def filtered(self) -> frozenset[str]:
-        """The topics of the outputs that are filtered: messages must carry these."""
+        """The topics of the outputs that are filtered: messages must carry these, not calls."""
         names = observing.data_of(self.options).get("filter", ())
         outputs = {n: r for n, r in self.rules.items() if n.startswith("out.") and isinstance(r, Fields | Choice)}
         for at, name in enumerate(names):
-            if name not in outputs:
-                hint = suggest(str(name), outputs)
-                self.wrong(f"filter: {name} is no output that messages carry", "filter", at, hint=hint)
+            if name not in outputs or is_part(outputs[name].topic):
+                hint = None if name in outputs else suggest(str(name), outputs)
+                self.wrong(f"filter: {name} is no output that a topic's messages carry", "filter", at, hint=hint)
         return frozenset(same_topic(outputs[name].topic) for name in names if name in outputs)
 
     def heard(self, key: str, entry: Any) -> list[str]:

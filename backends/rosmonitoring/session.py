@@ -28,7 +28,7 @@ from .notes import readable
 from .observing import NAME, method_of
 from .options import Setup, known_types, origin, same_topic, setup
 from .rules import NOTHING_KNOWN
-from .traces import opened, transforms
+from .traces import Services, opened, transforms
 from .watched import Fault, Tally, Violation, remedies
 
 RAW = "_mon"
@@ -96,6 +96,8 @@ class Session:
     """The number of messages of filtered topics, as published and as passed on."""
     asked: frozenset[str] = frozenset()
     """The nodes to be monitored: those named, otherwise those with such a method in the plan, otherwise all."""
+    services: Services = field(default_factory=Services)
+    """The calls that ROSMonitoring reports live."""
     _blame: Blame | None = None
 
     def __post_init__(self) -> None:

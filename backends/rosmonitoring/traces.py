@@ -7,13 +7,14 @@ import gc
 import json
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.base.suggestions import nearby, nearest
 from avow.ros import bags
-from avow.ros.bags import NOWHERE, Carried, Event, Origin, is_bag
+from avow.ros.bags import NOWHERE, Carried, Event, Origin, enveloped, is_bag
+from avow.ros.calls import CALL
 from avow.ros.frames import TREE, Tree
 
 from .tuning import CHUNK, EVENT_CHARACTERS, LATEST_TIME
@@ -43,6 +44,49 @@ def parse_event(text: str) -> Event:
     return found
 
 
+@dataclass(slots=True)
+class _Open:
+    """The calls of one service. `call`: that of the only request since none was open; None if that is not known."""
+
+    number: int = 0
+    call: str | None = None
+
+
+@dataclass(slots=True)
+class Services:
+    """The events of ROSMonitoring's service monitors as parts of calls. Such an event does not identify its call. A
+    response belongs to a request if no other call of the service was open since that request. Otherwise it gets a call
+    of its own, without a request."""
+
+    calls: dict[str, _Open] = field(default_factory=dict)
+    events: int = 0
+
+    def part(self, event: Event) -> Event:
+        """A service's event as the part of a call, with the next number; another event as it is. Raises ValueError."""
+        service = event.get("service")
+        if "topic" in event or not isinstance(service, str):
+            return event
+        kind, *more = [name for name in ("request", "response") if name in event] or ("", "")
+        if more:
+            raise ValueError("the event of a service has either a `request` or a `response`")
+        fields = event[kind] if isinstance(event[kind], dict) else {}  # in ROS 1 a message without fields is a text
+        self.events += 1
+        own, known = f"{service} {self.events}", self.calls.setdefault(service.lstrip("/"), _Open())
+        if kind == "request":
+            known.call = own if known.number == 0 and not _sorted_by_stamp(fields) else None
+            known.number += 1
+        else:
+            if known.number == 1 and known.call is not None and not _sorted_by_stamp(fields):
+                own = known.call
+            known.number = max(0, known.number - 1)
+        return {**enveloped(fields, f"{service}/_{kind}", 0), "time": event.get("time"), CALL: own}
+
+
+def _sorted_by_stamp(fields: Event) -> bool:
+    """Whether ROSMonitoring may have moved a message to the place of its stamp (`ordering`)."""
+    return not {"header", "stamp"}.isdisjoint(fields)
+
+
 def _wrong_time(event: Event) -> str:
     """The error in the time of a recorded event; empty if it is right. ROSMonitoring writes a time with every event, in
     seconds, and a record without it was cut or assembled by hand."""
@@ -62,14 +106,15 @@ def _json(raw: object) -> str:
     return raw.decode()[:60] if isinstance(raw, bytes) else json.dumps(raw, default=str)[:60]
 
 
-def event_of(line: str, name: str, number: int) -> Event | None:
-    """The event of one line of a trace; None for a blank one. Raises Rejected."""
+def event_of(line: str, name: str, number: int, services: Services) -> Event | None:
+    """The event of one line of a trace; None for a blank one. `services` receives the events of all lines in turn.
+    Raises Rejected."""
     if not line or line.isspace():
         return None
     if len(line) > EVENT_CHARACTERS:
         raise Rejected(_fault(name, number, 1, f"the line is longer than {EVENT_CHARACTERS} characters"))
     try:
-        event = parse_event(line)
+        event = services.part(parse_event(line))
     except json.JSONDecodeError as error:
         raise Rejected(_fault(name, number, error.colno, f"this is not JSON: {error.msg}")) from None
     except ValueError as error:
@@ -94,10 +139,10 @@ def read_lines(
 ) -> Iterator[Recorded]:
     """The events of lines of text whose numbers are chosen; blank lines are skipped. Raises Rejected at the first line
     that is no event."""
-    index = 0
+    index, services = 0, Services()
     for number, line in enumerate(lines, start=1):
         index += bool(line) and not line.isspace()
-        if chosen(index) and (event := event_of(line, name, number)) is not None:
+        if chosen(index) and (event := event_of(line, name, number, services)) is not None:
             yield Recorded(index, number, event)
 
 
@@ -139,7 +184,9 @@ def unread(path: Path, error: OSError) -> Rejected:
     return Rejected(Diagnostic("MON201", f"cannot read {path}: {error.strerror or error}", hint=nearby(path)))
 
 
-def parsed(chunk: bytes, name: str, before: int) -> tuple[list[Event], Sequence[int], int, Rejected | None]:
+def parsed(
+    chunk: bytes, name: str, before: int, services: Services
+) -> tuple[list[Event], Sequence[int], int, Rejected | None]:
     """The events of some whole lines, their line numbers, the number of lines, and the error at the line after these
     events. `before`: the number of earlier lines."""
     try:
@@ -166,7 +213,7 @@ def parsed(chunk: bytes, name: str, before: int) -> tuple[list[Event], Sequence[
     at: list[int] = []
     for line, number in zip(written, numbers, strict=True):
         try:
-            event = event_of(line, name, number)
+            event = event_of(line, name, number, services)
         except Rejected as wrong:
             return events, at, len(lines), wrong
         if event is not None:

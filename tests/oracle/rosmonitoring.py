@@ -40,7 +40,10 @@ def problems(text: str) -> list[str]:
         ]
         if not isinstance(monitor.get("log"), str):
             found.append("`log` must be a path")
-        found += _topic_problems(monitor.get("topics"))
+        found += _interface_problems(monitor.get("topics"), "topic", "msg")
+        found += _interface_problems(monitor.get("services", []), "service", "srv")
+        if not monitor.get("topics") and not monitor.get("services"):
+            found.append("a monitor has at least one topic or service")
     return found
 
 
@@ -56,21 +59,21 @@ def _taken(name: str, taken: set[str]) -> bool:
     return found
 
 
-def _topic_problems(topics: Any) -> list[str]:
-    if not isinstance(topics, list):
-        return ["`topics` must be a list"]
+def _interface_problems(listed: Any, kind: str, module: str) -> list[str]:
+    if not isinstance(listed, list):
+        return [f"`{kind}s` must be a list"]
     found, names = [], set()
-    for topic in topics:
+    for topic in listed:
         if not isinstance(topic, dict) or not {"name", "type", "action"} <= topic.keys():
-            found.append("a topic has a name, a type and an action")
+            found.append(f"a {kind} has a name, a type and an action")
             continue
         name = str(topic["name"]).lstrip("/")
         if name in names:
-            found.append(f"the topic {name} occurs twice")
+            found.append(f"the {kind} {name} occurs twice")
         names.add(name)
         parts = str(topic["type"]).split(".")
-        if len(parts) != 3 or parts[1] != "msg" or not all(p.isidentifier() for p in parts):
-            found.append(f"the type {topic['type']!r} is not of the form package.msg.Type")
+        if len(parts) != 3 or parts[1] != module or not all(p.isidentifier() for p in parts):
+            found.append(f"the type {topic['type']!r} is not of the form package.{module}.Type")
         if topic["action"] not in ("log", "filter"):
             found.append(f"the action {topic['action']!r} is neither log nor filter")
     return found

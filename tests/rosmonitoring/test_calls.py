@@ -2,11 +2,20 @@
 
 from __future__ import annotations
 
+import json
+import runpy
+import subprocess
+import sys
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
+import yaml
+from oracle.rosmonitoring import problems
 
+from avow.backends.rosmonitoring.configuration import configuration, of_system
+from avow.backends.rosmonitoring.live.serve import answer
 from avow.backends.rosmonitoring.options import setup
 from avow.backends.rosmonitoring.rml.translate import translate
 from avow.backends.rosmonitoring.session import session
@@ -159,7 +168,7 @@ def test_calls_link_and_rml_refuses_them_by_name(tmp_path: Path) -> None:
     node = system.contract.node("server")
     found, faults = setup(system, node, system.plan.node("server").methods[0].options)
     assert faults == ()
-    assert "ROSMonitoring listens to topics" in translate(found, node.guarantees).refused["limits"]
+    assert "Avow writes RML about topics" in translate(found, node.guarantees).refused["limits"]
 
 
 def test_ends_of_a_call_have_to_agree(tmp_path: Path) -> None:
@@ -335,3 +344,147 @@ def test_a_json_trace_names_the_parts(tmp_path: Path) -> None:
         encoding="utf-8",
     )
     assert broken(spinning(tmp_path), trace) == [("all_done", 3)]
+
+
+# -- ROSMonitoring's service monitors ----------------------------------------------------------------------------------
+
+
+def parts(system: System, **options: Any) -> list[tuple[Any, dict[str, Any]]]:
+    return [(setup(system, node, None)[0], {"ros_version": "ros2", **options}) for node in system.contract.nodes]
+
+
+def test_one_monitor_forwards_the_calls_of_a_service(tmp_path: Path) -> None:
+    """That of the server, wherever it stands. A service's monitor only logs, also where all is ordered."""
+    server, client = CONTRACT.split("\nnode client")
+    system = make(tmp_path, contract=f"node client{client}\n{server}\n")
+    text = of_system(parts(system, ordered="50 ms"))
+    assert problems(text) == []
+    assert yaml.safe_load(text)["monitors"] == [
+        {
+            "monitor": {
+                "id": "monitor_server",
+                "log": "./server_log.txt",
+                "silent": False,
+                "warning": 1,
+                "topics": [],
+                "services": [
+                    {
+                        "name": "/go",
+                        "type": "my_msgs.srv.Go",
+                        "action": "log",
+                        "ordering": {"enabled": True, "max_delay_ms": 50},
+                    }
+                ],
+            }
+        }
+    ]
+    alone = configuration(*next(p for p in parts(system) if p[0].node.name == "client"))
+    assert problems(alone) == []
+    assert "name: /go\n" in alone
+
+
+def test_actions_are_left_out_and_calls_are_not_filtered(tmp_path: Path) -> None:
+    spinning(tmp_path)
+    send = "my_msgs/Spin_SendGoal_Response /spin/_action/send_goal matches(out.done)"
+    contract = ACTION.replace("my_msgs/Spin_Result /spin matches(out.done)", send)
+    (tmp_path / "s.rcl").write_text(contract, encoding="utf-8")
+    with pytest.raises(Rejected, match="a list of monitors"):
+        of_system(parts(load_system(tmp_path)))
+    plan = PLAN.replace("{by: call}", "{by: call}, filter: [out.ok]")
+    system = make(tmp_path, plan)
+    server = system.plan.node("server").methods[0].options
+    faults = setup(system, system.contract.node("server"), server)[1]
+    assert [fault.message for fault in faults] == ["filter: out.ok is no output that a topic's messages carry"]
+
+
+def request(time: float, **fields: Any) -> dict[str, Any]:
+    return {"service": "/go", "time": time, "request": fields}
+
+
+def response(time: float, ok: bool, **more: Any) -> dict[str, Any]:
+    return {"service": "/go", "time": time, "response": {"ok": ok, "in": "", **more}}
+
+
+SEQUENCES: dict[str, tuple[list[dict[str, Any]], int, int]] = {
+    "good": (
+        [
+            {"service": "/stop", "time": 0, "request": ""},
+            request(1, speed=1),
+            response(2, True),
+            request(3, speed=5),
+            response(4, False),
+        ],
+        2,
+        0,
+    ),
+    "wrong": ([request(1, speed=1), response(2, True), request(3, speed=5), response(4, True)], 2, 1),
+    "overlapping": ([request(1, speed=1), request(2, speed=5), response(3, False), response(4, True)], 0, 0),
+    "after an overlap": (
+        [request(1, speed=1), request(2, speed=1), response(3, False), response(4, False)]
+        + [event for k in range(5, 105, 2) for event in (request(k, speed=1), response(k + 1, k != 99))],
+        50,
+        1,
+    ),
+    "late": (
+        [request(1, speed=1), request(2, speed=5), response(3, False), request(4, speed=5), response(5, True)],
+        0,
+        0,
+    ),
+    "answered twice": ([request(1, speed=1), response(2, True), response(3, False)], 1, 0),
+    "no request": ([response(1, True), request(2, speed=5), response(3, False)], 1, 0),
+    "stamped": ([request(1, speed=5, stamp={"sec": 1, "nanosec": 0}), response(2, True)], 0, 0),
+    "stamped response": ([request(1, speed=5), response(2, True, header={})], 0, 0),
+}
+"""Calls as ROSMonitoring reports them, and how many of them are decided and broken."""
+
+
+@pytest.mark.parametrize("name", SEQUENCES)
+def test_calls_that_service_monitors_report(name: str, tmp_path: Path) -> None:
+    """A response without a certain request is undecided, in a log and live."""
+    events, decided, broken = SEQUENCES[name]
+    system = make(tmp_path)
+    trace = tmp_path / "run.jsonl"
+    trace.write_text("".join(json.dumps(event) + "\n" for event in events), encoding="utf-8")
+    recorded, live = session(system, ("server",), trace), session(system, ("server",))
+    assert [v.clause for _, v in recorded.run(trace)] == ["limits"] * broken
+    live.prompt()
+    replies = [json.loads(answer(live, json.dumps(event))) for event in events]
+    assert [reply["verdict"] for reply in replies].count("currently_false") == broken
+    assert [*live.finish()] == []
+    for running in (recorded, live):
+        assert running.monitors[0].tallies["limits"].decided == decided
+        assert bool(running.unmonitored()) is (decided < sum("response" in event for event in events))
+
+
+@pytest.mark.parametrize("wrong", [{"request": {}, "response": {}}, {}])
+def test_an_event_of_a_service_has_one_part(wrong: dict[str, Any], tmp_path: Path) -> None:
+    event = json.dumps({"service": "/go", "time": 1, **wrong})
+    (tmp_path / "run.jsonl").write_text(event + "\n", encoding="utf-8")
+    system = make(tmp_path)
+    with pytest.raises(Rejected, match="either a `request` or a `response`"):
+        [*session(system).run(tmp_path / "run.jsonl")]
+    assert json.loads(answer(session(system), event))["verdict"] == "currently_false"
+
+
+@pytest.mark.parametrize(("ros", "folder"), [("ros1", "src"), ("ros2", "monitor")])
+def test_rosmonitoring_makes_the_monitor_whose_events_are_judged(ros: str, folder: str, tmp_path: Path) -> None:
+    """With ROSMonitoring's own generator (3.0, not on PyPI: `PYTHONPATH=…/ROSMonitoring/src`), without ROS."""
+    generator = [sys.executable, "-m", "rosmonitoring.cli"]
+    if subprocess.run([*generator, "--help"], cwd=tmp_path, capture_output=True, check=False).returncode:
+        pytest.skip("ROSMonitoring is not on the path")
+    system = make(tmp_path)
+    (tmp_path / "all.yaml").write_text(of_system(parts(system)), encoding="utf-8")
+    subprocess.run(
+        [*generator, "generate", "all.yaml", "--ros-version", ros, "--output", "."], cwd=tmp_path, check=True
+    )
+    made = runpy.run_path(str(tmp_path / "monitor" / folder / "monitor_server.py"))
+    (interface,) = made["INTERFACES"]
+    own = made["ROSMonitor_monitor_server"].__new__(made["ROSMonitor_monitor_server"])
+    events = [
+        own._wire_event(own._event(interface, SimpleNamespace(**content), kind))
+        for speed, ok in ((1.0, True), (5.0, True))
+        for kind, content in (("request", {"speed": speed}), ("response", {"ok": ok}))
+    ]
+    (tmp_path / "run.jsonl").write_text("".join(json.dumps(e) + "\n" for e in events), encoding="utf-8")
+    running = session(system, ("server",), tmp_path / "run.jsonl")
+    assert [(v.clause, v.index) for _, v in running.run(tmp_path / "run.jsonl")] == [("limits", 4)]

@@ -106,7 +106,9 @@ def test_a_filter_is_of_outputs(tmp_path: Path) -> None:
     """Without an oracle nobody would tell the ROS monitor what is broken: it then logs."""
     system = two(tmp_path, a={"filter": ["in.r", "out.s"]})
     found, faults = setup(system, system.contract.node("a"), system.plan.node("a").methods[0].options)
-    assert [fault.message.split(":")[1].strip() for fault in faults] == ["in.r is no output that messages carry"]
+    assert [fault.message.split(":")[1].strip() for fault in faults] == [
+        "in.r is no output that a topic's messages carry"
+    ]
     assert len(found.filtered) == 1
     assert "filter" not in of_system([(found, {})])
 

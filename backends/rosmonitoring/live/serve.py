@@ -24,7 +24,7 @@ def answer(session: Session, frame: str | bytes) -> str:
     """The reply to one frame. Never raises, whatever the frame contains."""
     try:
         text = frame.decode() if isinstance(frame, bytes) else frame
-        event = parse_event(text)
+        event = session.services.part(parse_event(text))
         reply: dict[str, Any] = json.loads(text)
     except (ValueError, RecursionError) as error:
         return json.dumps({"verdict": "currently_false", "error": f"this is no event: {error}"})

@@ -186,7 +186,7 @@ class _Machine:
         for name in names:
             topic = getattr(self.setup.rules.get(name), "topic", "")
             if is_part(topic):
-                raise rml.NotRml(f"{name} is a part of a call ({topic}), and ROSMonitoring listens to topics")
+                raise rml.NotRml(f"{name} is a part of a call ({topic}), and Avow writes RML about topics")
         self._choose(names)
         guard = Eliminator(self.symbols).condition(self.clause.formula)
         complete = rml.every(
