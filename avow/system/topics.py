@@ -130,16 +130,26 @@ def unknown_types(plan: Plan, contract: Contract) -> Iterator[Diagnostic]:
         if package not in packages:
             near[:0] = (f"{other}/{word}" for other in nearest(package, packages, alike=0.75))
             text = f"neither `messages` nor the distribution has the package {package}, of {kind}"
-        if package in packages or ((plan.messages or kind in needed) and package not in missing):  # one a package
-            meant = f"did you mean `{near[0]}`?" if near else suggest(word, own) or ""
-            hint = f"{meant} If not, add its definition (`{package}/msg/….msg`) under `messages`".removeprefix(
-                " If not, "
-            )
+        file = _definition(package, word)
+        # a package is named once, and the parts of a call are in one file
+        if file not in missing and (
+            package in packages or ((plan.messages or kind in needed) and package not in missing)
+        ):
+            hint = f"add its definition (`{file}`) under `messages`"
+            known = suggest(word, own)
+            hint = f"did you mean `{near[0]}`? If not, {hint}" if near else f"{hint}; {known}" if known else hint
             if kind in needed:
                 yield Diagnostic("DRIVE101", f"{text}: its class cannot be driven", span, hint=hint)
             else:
                 yield Diagnostic("ROS104", text, span, Severity.WARNING, hint)
-        missing |= {package} - packages
+        missing |= ({package} - packages) | ({file} if "_" in word else set())
+
+
+def _definition(package: str, word: str) -> str:
+    """The file that would define a type: ``my_msgs/srv/SetMode.srv`` for a part of that service's calls."""
+    name, _, part = word.partition("_")
+    kind = "srv" if part in ("Request", "Response") else "action" if part else "msg"
+    return f"{package}/{kind}/{name}.{kind}"
 
 
 def _parts_of(known: Definitions, kinds: Collection[str]) -> Iterator[tuple[str, Span, str]]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from importlib import metadata
 from pathlib import Path
@@ -91,7 +92,8 @@ class RosMonitoringBackend(Backend):
                 hint = "put the recording there, or write this digest if it is the one that is meant"
                 problems.append(Diagnostic("MON102", message, span, hint=hint))
             elif not faults:
-                problems += [*readable(found, path, origin(job.system)), *unheard(found, path, job.system)]
+                other = readable(found, path, origin(job.system))
+                problems += [replace(d, span=d.span or span) for d in other] + [*unheard(found, path, job.system)]
             for _, wrong, hint in unknown_outside(job.node, outside(job.method.options, name)):
                 problems.append(Diagnostic("MON101", f"traces: outside: {wrong}", span, hint=hint))
         bags = not any(name.endswith(".jsonl") for name in _traces(job))  # whose messages have their types' fields only

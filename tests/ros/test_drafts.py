@@ -146,7 +146,8 @@ def test_names_suggest_who_publishes(topics: list[str], heard: list[str], nodes:
 def test_a_bag_and_a_graph(form: str, tmp_path: Path) -> None:
     (tmp_path / "graph.txt").write_text(GRAPH, encoding="utf-8")
     bag = make_bag(tmp_path / "run", form)
-    options = ("--from-bag", str(bag), "--from-graph", str(tmp_path / "graph.txt"), "--distro", "humble")
+    options = ("--from-bag", str(bag), "--from-graph", str(tmp_path / "graph.txt"))
+    options += ("--distro", "noetic" if form == "ros1" else "humble")
     loaded = load_system(run(tmp_path / "w", *options, warned="has the package nobody"))
     graph = dataflow(loaded)
     assert [str(edge) for edge in graph.edges] == ["geiger.rate → sensor.rate"]
