@@ -136,8 +136,8 @@ def unknown_types(plan: Plan, contract: Contract) -> Iterator[Diagnostic]:
             package in packages or ((plan.messages or kind in needed) and package not in missing)
         ):
             hint = f"add its definition (`{file}`) under `messages`"
-            known = suggest(word, own)
-            hint = f"did you mean `{near[0]}`? If not, {hint}" if near else f"{hint}; {known}" if known else hint
+            others = suggest(word, own)
+            hint = f"did you mean `{near[0]}`? If not, {hint}" if near else f"{hint}; {others}" if others else hint
             if kind in needed:
                 yield Diagnostic("DRIVE101", f"{text}: its class cannot be driven", span, hint=hint)
             else:
