@@ -112,8 +112,6 @@ INSTEAD = {
     "avow translate --to rml SYSTEM [--node NAME] [-o FOLDER]": "avow translate"
     " --to rml thermostat --node thermostat -o made"
     " && avow translate --to rml thermostat --node thermostat",
-    "avow translate --to rml remote_inspection_published --node agent": "avow translate"
-    f" --to rml {ROOT}/contracts/remote_inspection_published --node agent",
     "avow translate --to …": "avow translate --to unicode thermostat",
     "python -m avow": "python -m avow --version",
 }
