@@ -17,9 +17,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
-from codac import Interval
-
 from .expressions import Expression
+from .intervals import Interval, outward
 from .series import ZERO, Dual, Undefined, interval, taylor, values
 from .tuning import GENERATORS, ORDER, PICARD, TOO_WIDE
 
@@ -59,6 +58,7 @@ class Motion:
             yield found
             now, before = then, found.after
 
+    @outward()
     def _step(self, zonotope: _Zonotope, before: Box, start: Fraction, end: Fraction) -> tuple[Step, _Zonotope]:
         """All that the zonotope holds goes on, though solutions are in the box `before` too."""
         h, hull = interval(end - start), zonotope.hull()
@@ -179,10 +179,12 @@ class _Zonotope:
     generators: tuple[tuple[float, ...], ...]
 
     @classmethod
+    @outward()
     def of(cls, box: Box) -> _Zonotope:
         center = tuple(x.mid() for x in box)
         return cls(center, _diagonal([(x - Interval(c)).mag() for x, c in zip(box, center, strict=True)]))
 
+    @outward()
     def hull(self) -> Box:
         found = []
         for k, center in enumerate(self.center):

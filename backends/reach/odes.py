@@ -6,8 +6,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
-from codac import Interval
-
 from avow.base.plain import count
 from avow.base.verdict import Verdict
 from avow.language.contract import Clause
@@ -15,6 +13,7 @@ from avow.language.contract import Clause
 from .answers import Found, Question
 from .expressions import Expression
 from .flow import Box, Motion, Stuck
+from .intervals import Interval, outward
 from .picture import Piece, shown
 from .series import Undefined, interval, values
 from .truth import Span
@@ -89,6 +88,7 @@ def _inputs(question: Question, spans: Sequence[Span]) -> dict[str, Interval]:
     return {name: _interval(span) for name, span in zip(question.given.inputs, spans, strict=True)}
 
 
+@outward()
 def _piece(question: Question, start: Fraction, end: Fraction, box: Box, inputs: Mapping[str, Interval]) -> Piece:
     states, outputs = question.given.equations, question.given.outputs
     found = {port: _output(term, [*states, *inputs], [*box, *inputs.values()]) for port, term in outputs.items()}

@@ -11,10 +11,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
-import codac
-from codac import Interval
-
 from .expressions import Expression, value
+from .intervals import Interval, codac, outward
 
 Dual = tuple[Interval, ...]
 """An interval and its partial derivatives, or the interval alone: all are 0."""
@@ -171,12 +169,14 @@ def constant(number: Fraction) -> Series:
     return Series(((interval(number),),))
 
 
+@outward()
 def values(terms: Sequence[Expression], names: Sequence[str], of: Sequence[Dual]) -> list[Dual]:
     """The terms over the box that the names have. Raises Undefined."""
     known = {name: Series((dual,)) for name, dual in zip(names, of, strict=True)}
     return [value(term, known, constant).of[0] for term in terms]
 
 
+@outward()
 def taylor(
     equations: Mapping[str, Expression], begin: Sequence[Dual], inputs: Mapping[str, Interval], order: int
 ) -> list[list[Dual]]:

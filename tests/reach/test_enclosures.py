@@ -22,6 +22,7 @@ from avow.conformance.seeded import Seeded, settle
 pytest.importorskip("codac", reason="the extra motion")
 
 from avow.backends.reach.flow import Motion, Step, Stuck
+from avow.backends.reach.intervals import Interval, outward
 from avow.backends.reach.series import Series, around, interval
 
 NODE = """\
@@ -342,3 +343,12 @@ def test_a_box_that_is_left_again_proves_nothing(tmp_path: Path) -> None:
     motion = {"ode": {"x": "-x + 2 * u"}, "initial": {"x": [-1, 1]}, "horizon": 3, "step": 0.05}
     assert judged(tmp_path / "1", "out.y <= 3", **motion).verdict is Verdict.CHECKED
     assert judged(tmp_path / "2", "out.y <= 1.5", **motion).verdict is Verdict.REFUTED
+
+
+def test_the_processor_rounds_as_codac_needs_it_only_where_it_computes(tmp_path: Path) -> None:
+    """codac's import sets another rounding for the whole process, in which 1.2 is read as 1.2000000000000002."""
+    run(tmp_path, "out.y <= 3", **FALLING)
+    assert (float("1.2"), 0.1 + 0.7, 1 / 3) == (1.2, 0.7999999999999999, 0.3333333333333333)
+    assert (near := Interval(1) / 3).lb() == near.ub(), "codac's intervals would be wrong outside"
+    with outward():
+        assert (third := Interval(1) / 3).lb() < third.ub()
