@@ -11,6 +11,7 @@ from itertools import product
 
 from avow.backend_kit.protocol import Job
 from avow.base.diagnostics import Diagnostic, Severity, Span
+from avow.base.suggestions import nearest
 from avow.formulas.renaming import bound_names
 from avow.formulas.traversal import depth
 from avow.language.contract import Clause
@@ -317,4 +318,7 @@ def _shown(word: _Word) -> str:
 def _warning(what: str, word: _Word, kind: str, known: set[_Word], span: Span | None) -> Diagnostic:
     message = f"{what} speaks of the {kind} {_shown(word)}, which neither the program nor the environment ever has"
     hint = f"{kind}s that there are: {', '.join(sorted(map(_shown, known))[:12])}" if known else None
+    near = nearest(word[0], {name for name, _ in known} - {word[0]})
+    if near:  # a ban of a misspelt action would hold of any program
+        return Diagnostic("AJPF135", message, span, hint=f"did you mean `{near[0]}`?")
     return Diagnostic("AJPF134", message, span, Severity.WARNING, hint=hint)

@@ -44,7 +44,7 @@ class RosMonitoringBackend(Backend):
 
     name = "rosmonitoring"
     title = "runtime monitors, and recorded traces judged by them"
-    version = "17"
+    version = "18"
     strength = Verdict.MONITORED
     link = Link.MAPPED
     of = Object.RECORDING

@@ -133,14 +133,14 @@ def setup(
     work.shared_fields()
     for name, told in read_from_inputs(work.rules, work.mapping()):
         work.fault(f"it is read from the message that gives {told}", name, hint="name what the node publishes")
-    filtered = work.filtered()
     data = observing.data_of(options)
-    named = tuple((_called(system, node, topic), topic.ros_type) for topic in node.topics)
+    named, leeway = tuple((_called(system, node, t), t.ros_type) for t in node.topics), work.leeway(data)
+    answers = work.answers(data.get("answers"), leeway.jitter)
     made = Setup(
-        node, work.rules, work.hidden, str(data.get("when", "outputs")), known, work.answers(data.get("answers")),
+        node, work.rules, work.hidden, str(data.get("when", "outputs")), known, answers,
         float(data.get("decided", DECIDED_SHARE)), named, work.fresh(data.get("fresh")), work.rates(data.get("rate")),
-        work.duration("max_age", data["max_age"]) if "max_age" in data else None, data.get("losses"), filtered,
-        work.leeway(data), By(str(data.get("time", By.RECEIPT))), work.shared,
+        work.duration("max_age", data["max_age"]) if "max_age" in data else None, data.get("losses"), work.filtered(),
+        leeway, By(str(data.get("time", By.RECEIPT))), work.shared,
     )  # fmt: skip
     return made, tuple(work.faults)
 
@@ -226,7 +226,7 @@ class _Work:
             self.wrong(f"{place}: {NO_TIME}, not {written}", *place.split(".", 1))
             return Fraction(0)
 
-    def answers(self, entry: Any) -> Answers | None:
+    def answers(self, entry: Any, jitter: Fraction) -> Answers | None:
         if not isinstance(entry, Mapping):
             return None
         by = str(entry.get("by", "latency"))
@@ -252,7 +252,7 @@ class _Work:
             observing.path(str(entry["input"])) if "input" in entry else usual,
             observing.path(str(entry["output"])) if "output" in entry else usual,
             self.duration("answers.latency", said.get("latency", "0 s")),
-            self.duration("answers.jitter", said.get("jitter", "0 s")),
+            self.duration("answers.jitter", said["jitter"]) if "jitter" in said else jitter * (by != "latency"),
             frozenset(port.variable.qualified for port in looped),
             "others" in entry,
             {name: named(topic).partition("/_action/")[0] for name, topic in parts.items()},

@@ -165,8 +165,11 @@ class Paired:
         latency = self._by == "latency"
         for name, (first, _) in ranges.items():
             certain &= first >= 0
-            if not latency and name in self._pairing.answers.looped:  # the engine judges an input after its answer
-                certain[certain] &= self._inputs[name].seconds[first[certain]] <= self._batch.times[rows[certain]]
+            if not latency:  # the engine judges an input after its answer, by exact times
+                own = self._pairing.answers
+                ahead = 0.0 if name in own.looped else max(0.0, float(own.jitter) - 1e-6)
+                late = self._inputs[name].seconds[first[certain]] - self._batch.times[rows[certain]]
+                certain[certain] &= late <= ahead
         ends = ids + self._jitter if latency else rows
         if latency:
             certain &= ends < self._times[self._listened[-1]]

@@ -36,6 +36,7 @@ if TYPE_CHECKING:
 NUMBER = "_number"
 """By order: the field with a message's number among those of its topic."""
 AFTER = "in a loop, an input with the answer's key came after the answer: pair them in another way (`answers`)"
+BEFORE = "the answer came before its input (by more than `jitter`): they do not belong together, or a time is wrong"
 LOST = "a message was lost: the order of the others does not show which belong together"
 
 
@@ -62,6 +63,11 @@ class Answers:
             return frozenset(inputs)
         own = {self.calls.get(name) for name in outputs} - {None} if key is not None else set()
         return frozenset(name for name in inputs if self.calls.get(name) not in own) if self.others else frozenset()
+
+    def precedes(self, name: str, answer: Ticks, came: Ticks, jitter: Ticks) -> bool:
+        """Whether an answer is too early for a message of this input to be its cause. A time of `jitter` is allowed for
+        clocks and recorders, except in a loop. All in one unit."""
+        return came > answer + (0 if name in self.looped else jitter)
 
 
 Ticks = int | Fraction
@@ -422,8 +428,8 @@ class Pairing:
             field = " (`_call` in JSON lines)" if self.answers.by == "call" else ""
             said = f"no message of {name} has the answer's {self.answers.by}{field}"
             return f"{said}: it was lost or bears none, or `answers` pairs wrongly"
-        if name in self.answers.looped and any(one.time > asked.time for one in alike):
-            return AFTER
+        if any(self.answers.precedes(name, asked.time, one.time, self.jitter) for one in alike):
+            return AFTER if name in self.answers.looped else BEFORE
         if len(alike) == 1:
             alike[0].used = True
             asked.since[name] = alike[0].seconds

@@ -108,9 +108,9 @@ class Tally:
             self.aging(name, now - heard[name])
 
     def aging(self, name: str, age: float) -> None:
-        """An input had this age, in seconds, when an answer came."""
-        if age > self.ages.get(name, -1.0):
-            self.ages[name] = max(age, 0.0)
+        """An input had this age, in seconds, when an answer came. Negative: it came later, and has none."""
+        if age >= self.ages.get(name, 0.0):
+            self.ages[name] = age
 
     def unnamed(self, topic: str) -> None:
         """A message of a topic that other nodes publish too has come, without a record of its publisher."""

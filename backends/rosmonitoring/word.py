@@ -129,8 +129,8 @@ class Word:
         self._forget(key)
         inputs = tuple(message for message in taken if not self.topics[message.topic])
         outputs = tuple(message for message in taken if self.topics[message.topic])
-        looped = [i for i in inputs if any(name in self.answers.looped for name, _ in i.readers)]
-        if any(time_of(i.event) > time_of(o.event) for i in looped for o in outputs):
+        pairs = ((n, time_of(o.event), time_of(i.event)) for o in outputs for i in inputs for n, _ in i.readers)
+        if any(self.answers.precedes(*pair, self.answers.jitter) for pair in pairs):
             yield from self._unpaired(taken)
             return
         given = {name: (message.place,) for message in inputs for name, _ in message.readers}

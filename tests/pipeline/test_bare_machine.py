@@ -74,7 +74,9 @@ def test_what_a_missing_tool_leaves_open_is_visible_and_named(path: Path, tmp_pa
     text = (robot / "reports" / "thermostat" / "report.md").read_text()
     assert "2 claims about programs not run" in text.split("##")[0]
     assert "2 not run, which the policy accepts" in text
-    assert "A tool is missing, failed or gave no verdict. Install: sudo apt install clang; sudo apt install dafny." in text
+    assert (
+        "A tool is missing, failed or gave no verdict. Install: sudo apt install clang; sudo apt install dafny." in text
+    )
     assert "nothing is known of these claims. Install: sudo apt install clang." in text
 
     edit(plan, (ACCEPTS, "policy: default\n"))

@@ -60,7 +60,7 @@ def planted(folder: Path, seed: int, answers: dict[str, Any], *, whole: bool = F
     plan = {"connections": connections, "nodes": {f"n{k}": {"methods": [method]} for k in nodes}}
     (folder / "plan.yaml").write_text(json.dumps(plan), encoding="utf-8")
     events, at = _run(rng, length, guilty, late, whole=whole)
-    lines = [json.dumps({"topic": f"v{k}", "time": n / 100, "data": value}) for n, (k, value) in enumerate(events)]
+    lines = [json.dumps({"topic": f"v{k}", "time": n / 10**5, "data": value}) for n, (k, value) in enumerate(events)]
     (folder / "t.jsonl").write_text("\n".join(lines) + "\n", encoding="utf-8")
     broken = "nonneg" if "nonneg" in guarantees else "same"
     return Planted(load_system(folder), folder / "t.jsonl", guilty, at, broken)

@@ -184,7 +184,10 @@ def test_of_paired_answers_hardly_any_is_judged_anew(
         pair = [{"topic": "r", "value": value, **both_}, {"topic": "s", "level": level, **both_}]
         if "latency" not in answers and rng.random() < 0.3:
             pair.reverse()
-        events += [{**event, "time": round(k / 2 + at * 0.1, 2)} for at, event in enumerate(pair)]
+        events += [
+            {**event, "time": round(k / 2 + at * (0.1 if "latency" in answers else 0.005), 3)}
+            for at, event in enumerate(pair)
+        ]
     found, quiet = both(setup_of(system), written(tmp_path / "t.jsonl", events, random.Random(1)))
     assert found > 10
     assert quiet > 1500

@@ -263,7 +263,7 @@ def shuffled(rng: random.Random, wrong: frozenset[int]) -> list[Event]:
     found: list[Event] = []
     while any(queues.values()):
         topic = rng.choice([name for name, left in queues.items() if left])
-        found.append({**queues[topic].pop(0), "time": len(found) / 10})
+        found.append({**queues[topic].pop(0), "time": len(found) / 10**5})
     return found
 
 
@@ -302,7 +302,7 @@ def test_an_answer_that_is_not_judged_is_counted(
     for k, value in enumerate(values):
         pair = [("r", value), ("s", value + 0.5 * (k in wrong))]
         for topic, told in reversed(pair) if k == 29 or rng.random() < 0.3 else pair:
-            events.append({"topic": topic, "time": len(events), "data": told})
+            events.append({"topic": topic, "time": len(events) / 1000, "data": told})
     mapping = {"in.r": "data", "out.s": "data", "in.last": {"previous": "out.s", **initial}}
     violations, tallies = judge(make_system(MEMORY, mapping, answers=ORDER), events)
     answers = [index for index, event in enumerate(events, start=1) if event["topic"] == "s"]
@@ -467,3 +467,19 @@ def test_without_a_way_for_a_state_beside_a_service_the_plan_is_told(make_system
     assert found.unmarked({"in.hold", "out.held"}, typed=True) == ""
     told = found.unmarked({"in.speed", "in.hold", "out.held"}, typed=True)
     assert told.startswith("in.speed is part of no call: pair the others by latency")
+
+
+@pytest.mark.parametrize("by", ["order", "key", "call"])
+def test_an_answer_before_its_input_is_undecided(by: str, make_system: Callable[..., System]) -> None:
+    """Seeded fault: a publication at the start and a recording that is cut early shift the pairs by one."""
+    topics = ["s", "r", "s", "r"]
+    times = ["0.990", "1", "1.1", "5"]  # the first within `jitter`, the second not
+    events: list[Event] = [
+        {"topic": topic, "time": float(time), "id": k // 2, "_call": k // 2, "value": 1, "level": "low"}
+        for k, (topic, time) in enumerate(zip(topics, times, strict=True))
+    ]
+    answers = {"order": ORDER, "key": KEY}.get(by, {"by": by})
+    violations, tallies = judge(make_system(RCL, MAPPING, answers=answers), events)
+    assert not violations
+    assert (tallies["low"].decided, tallies["low"].order, tallies["low"].ages) == (1, 1, {})
+    assert "came before its input" in tallies["low"].reason

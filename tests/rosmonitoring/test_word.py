@@ -66,7 +66,7 @@ def recorded(run: list[Step], rng: random.Random, numbered: bool = True) -> list
     while left := [topic for topic, queue in queues.items() if queue]:
         event = queues[rng.choice(left)].pop(0)
         event["header"] |= {"seq": event["id"]} if numbered else {}
-        events.append({**event, "time": len(events) / 10})
+        events.append({**event, "time": len(events) / 10**5})
     return events
 
 
@@ -209,12 +209,12 @@ def test_what_belongs_to_no_step_leaves_memory_unknown(spoil: str, way: str, mak
     run = answered(random.Random(6))
     events = [e for k in range(30) for e in recorded(run[k : k + 1], random.Random(k))]
     for k, event in enumerate(events):
-        event |= {"id": k // 3, "time": k, "header": {"stamp": {"secs": k // 3 + 1, "nsecs": 0}}}
+        event |= {"id": k // 3, "time": k / 10**4, "header": {"stamp": {"secs": k // 3 + 1, "nsecs": 0}}}
     at = next(k for k, event in enumerate(events) if (event["id"], event["topic"]) == (12, "o"))
     if spoil == "twice":
         events.insert(at, {**events[at]})
     elif spoil == "bare":
-        events[at] = {"topic": "o", "v": not events[at]["v"], "time": at}
+        events[at] = {"topic": "o", "v": not events[at]["v"], "time": at / 10**4}
     else:
         events.insert(at + 6, events.pop(at))
     monitor = Monitor(found(made(make_system, way, SAYS)))
