@@ -485,7 +485,7 @@ class _Work:
         return FunctionValue({}, False) if _says_empty(term, edge.source.port) else None
 
 
-_PAIR = "or pair by `latency` or `arrival`"
+_PAIR = "or pair by `latency` or `arrival` (in a second method, for these `guarantees:` alone)"
 _FIELD_HINT = "name the field under `mapping`, for instance `in.x: pose.x`"
 
 

@@ -27,6 +27,7 @@ from avow.ros.bags import ENVELOPE
 from .reading import Reader, at
 from .rules import FieldPath
 from .tuning import COMBINATIONS, KEYS_KEPT, LATEST_TIME, TICKS, UNANSWERED_KEPT
+from .watched import UNSAID
 from .wires import MappingError, NotANumber, exact, seconds
 
 if TYPE_CHECKING:
@@ -413,7 +414,7 @@ class Pairing:
         elif not current:
             return EARLY
         elif not before:
-            return f"{name} may have had no value yet"
+            return f"{name}{UNSAID}"
         asked.messages[name] = tuple(message.place for message in current)
         return current
 

@@ -145,6 +145,7 @@ def coverage(tally: Tally) -> str:
     return f"published {tally.published} times" + (f": {told}" if told else "")
 
 
+UNSAID = " may have had no value yet"
 DEPENDS = "it depends on which input the answer answered"
 
 
@@ -160,7 +161,8 @@ def remedies(tally: Tally, silent: Mapping[str, str], unread: Mapping[str, str])
     read, and why."""
     share = int(100 * tally.decided / tally.asked) / 100 if tally.asked else 0
     wanted = dict.fromkeys((*tally.awaited, *tally.reason.split()))
-    late = ", ".join(name for name in tally.awaited if name not in silent and name not in unread)
+    unsaid = tally.reason.removesuffix(UNSAID) if tally.reason.endswith(UNSAID) else ""
+    late = ", ".join(n for n in dict.fromkeys((*tally.awaited, unsaid)) if n and n not in silent and n not in unread)
     gone = ", ".join(dict.fromkeys(silent[name] for name in wanted if name in silent))
     wrong = "; ".join(f"{name}: {unread[name]}" for name in wanted if name in unread)
     said = f"give its value before the first message, mapping: {{{late.partition(',')[0]}: {{…, initial: …}}}}"
