@@ -78,7 +78,7 @@ class Level(StrEnum):
 
 
 MEANINGS = {
-    Level.SHOWN: "everything below is proved, or checked exhaustively, of the running program",
+    Level.SHOWN: "everything below is proved, or checked exhaustively, of the program as written or built",
     Level.MODELS: "something below is of a model, or of the wiring, only; the program may differ",
     Level.TESTS: "something below is sampled: tests, recordings or measurements",
     Level.TESTED_MODELS: "something below is sampled, and something of a model only; the program may differ",
