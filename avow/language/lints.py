@@ -76,20 +76,19 @@ def of_all(contract: Contract, files: Sequence[LintedFile], of_nodes: Iterable[f
 
 
 def tell(found: Iterable[Diagnostic], files: Sequence[LintedFile], off: frozenset[str]) -> None:
-    """Report the warnings neither switched off, by code or whole message, nor allowed by the files' comments."""
+    """Report the warnings neither switched off, by code or whole message, nor allowed by the files' comments. They are
+    reported in order of place, so that the same ones are kept where there are too many."""
     by_name = {file.reports.source.file: file for file in files}
     allowances = {name: _allowances(file) for name, file in by_name.items()}
+    places = []
     for diagnostic in (*found, *(unknown for file in files for unknown in _no_lints(file))):
-        if (
-            {diagnostic.code, diagnostic.message} & off
-            or diagnostic.span is None
-            or diagnostic.span.file not in by_name
-        ):
+        span = diagnostic.span
+        if {diagnostic.code, diagnostic.message} & off or span is None or span.file not in by_name:
             continue
-        line = diagnostic.span.line
-        if any(diagnostic.code in codes and a <= line <= b for codes, a, b in allowances[diagnostic.span.file]):
-            continue
-        by_name[diagnostic.span.file].reports.add(diagnostic)
+        if not any(diagnostic.code in codes and a <= span.line <= b for codes, a, b in allowances[span.file]):
+            places.append(((span.line, span.column, diagnostic.code, diagnostic.message), span.file, diagnostic))
+    for _, name, diagnostic in sorted(places, key=lambda found: found[0]):
+        by_name[name].reports.add(diagnostic)
 
 
 def _warning(

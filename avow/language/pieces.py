@@ -15,7 +15,6 @@ from itertools import pairwise
 from avow.base.diagnostics import Diagnostic
 from avow.base.records import dataclass
 from avow.base.remembered import Shelf, Stretch
-from avow.base.tuning.shown import DIAGNOSTICS
 from avow.language.contract import Contract, Node
 from avow.language.declarations import Declarations
 from avow.language.lexer import Token, tokens
@@ -116,8 +115,6 @@ def _by_pieces(sources: Sequence[Source], off: frozenset[str], shelf: Shelf) -> 
         *of_all(contract, files, (piece.spoken for piece in every)),
     ]
     tell(found, files, off)
-    if any(len(file.reports.found) >= DIAGNOSTICS for file in files):
-        raise _Whole
     return contract, tuple(d for file in files for d in in_order(file.reports))
 
 
