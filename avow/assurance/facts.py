@@ -202,6 +202,7 @@ def facts_of_case(case: Case) -> Facts:
                 validation=r.validation,
                 linked=r.linked,
                 source=r.source,
+                probability=r.probability,
             )
             for r in case.requirements
         ),

@@ -32,6 +32,7 @@ from avow.evidence.obligation import Kind, Obligation
 from avow.evidence.record import Evidence
 from avow.evidence.status import Status
 from avow.system.plan import Statement, Validation
+from avow.system.probability import Probability
 
 
 @dataclass(frozen=True, slots=True)
@@ -265,16 +266,19 @@ class RequirementView:
     """Digest of the contract's text for the names under `supported_by`."""
     source: str = field(default="", metadata=codec.LATER)
     """The document that it comes from, and the position in it."""
+    probability: Probability | None = field(default=None, metadata=codec.LATER)
+    """None: its formula has to hold without exception."""
 
     @property
     def formal(self) -> str:
-        """Its formula or temporal property; empty if it is prose."""
-        return self.formula or self.temporal
+        """Its formula, with the probability that is asked, or temporal property; empty if it is prose."""
+        return f"{self.formula}\n{self.probability.words}" if self.probability else self.formula or self.temporal
 
     @property
     def meaning(self) -> str:
         """A digest of its text and formulas, and of the names under `supported_by`."""
-        return sha256("\n".join((self.text, self.formula, self.temporal, *self.supported_by)))
+        likely = (self.probability.words,) if self.probability else ()
+        return sha256("\n".join((self.text, self.formula, self.temporal, *likely, *self.supported_by)))
 
     @property
     def noted(self) -> str:

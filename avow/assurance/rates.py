@@ -14,10 +14,10 @@ from avow.base.codec import LATER, Unreadable, from_json
 from avow.base.plain import count, decimal, listed
 from avow.base.records import dataclass
 from avow.base.verdict import Verdict
-from avow.evidence.record import COMPOSES, LIKELY, RATE, Evidence
+from avow.evidence.record import COMPOSES, LIKELY, LIKELY_LEAVES, RATE, Evidence
 from avow.evidence.status import Status, weigh
 from avow.kernel.check import Refused
-from avow.kernel.rates import Leaf, Stratum, Trial, composed
+from avow.kernel.rates import Leaf, Likely, Stratum, Trial, composed
 
 if TYPE_CHECKING:
     from avow.assurance.model import ObligationView
@@ -51,15 +51,16 @@ class RateView:
     @property
     def trial(self) -> Trial:
         """The unit that is counted, if there is a rate: all leaves have the same."""
-        return self.leaves[0].strata[0].trial
+        first = self.leaves[0]
+        return first.strata[0].trial if first.strata else first.trial
 
     @property
     def brief(self) -> str:
         """The text beside the level. A bound is rounded up, a confidence down."""
         if not self.bound or Fraction(self.bound) >= 1:
             return NO_RATE
-        sure = percent(self.confidence, ROUND_FLOOR)
-        return f"at most {percent(self.bound, ROUND_CEILING)} of {self.trial}s fail, at {sure} confidence"
+        sure = f", at {percent(self.confidence, ROUND_FLOOR)} confidence" if Fraction(self.confidence) < 1 else ""
+        return f"at most {percent(self.bound, ROUND_CEILING)} of {self.trial}s fail{sure}"
 
     @property
     def words(self) -> str:
@@ -85,6 +86,7 @@ class _Composes:
 def rate_of(own: Iterable[str], claims: Iterable[str], views: Mapping[str, ObligationView]) -> RateView | None:
     """The rate of a requirement by its own claims and everything that it rests on; None if none of that is sampled."""
     leaves, unrated = [], []
+    stated = {leaf.claim: leaf for name in own for record in views[name].records for leaf in _stated(record)}
     for name in claims:
         if (view := views.get(name)) is None:
             continue
@@ -95,6 +97,8 @@ def rate_of(own: Iterable[str], claims: Iterable[str], views: Mapping[str, Oblig
                 leaves.append(Leaf(name, max(samples, key=lambda strata: max(Fraction(s.bound) for s in strata))))
             else:
                 unrated.append(name)
+        elif (leaf := stated.get(short(name))) is not None:  # checked, say, of a model
+            leaves.append(Leaf(name, (), _decimal(1 - Fraction(leaf.least)), leaf.trial))
     if not leaves and not unrated:
         return None
     proof = next((found for name in own for record in views[name].records if (found := _composes(record))), None)
@@ -113,6 +117,13 @@ def rate_of(own: Iterable[str], claims: Iterable[str], views: Mapping[str, Oblig
         except Refused as refused:
             why = functools.reduce(lambda text, leaf: text.replace(leaf.claim, short(leaf.claim)), leaves, str(refused))
     return RateView("", "", tuple(leaves), why)
+
+
+def _stated(record: Evidence) -> tuple[Likely, ...]:
+    try:
+        return from_json(tuple[Likely, ...], record.details.get(LIKELY_LEAVES, []))
+    except Unreadable:
+        return ()
 
 
 def _composes(record: Evidence) -> _Composes | None:

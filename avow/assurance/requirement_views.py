@@ -50,6 +50,7 @@ def requirement_view(
         outdated=requirement.outdated,
         linked=requirement.linked,
         source=requirement.source,
+        probability=requirement.probability,
     )
 
 

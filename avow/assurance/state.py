@@ -131,6 +131,7 @@ def _items(case: Case) -> Iterator[tuple[tuple[str, str], Mapping[str, Value]]]:
                 "level": (r.level.value,),
                 "text": (r.text,),
                 "formula": (_formula(r, case.obligations),),
+                "probability": (r.probability.words if r.probability else "",),
                 "supported by": r.supported_by,
                 "failure rate": (r.rate.bound if r.rate else "",),
                 "search": (r.searched,),

@@ -19,11 +19,13 @@ from avow.base.remembered import by_identity
 from avow.base.verdict import Hypothesis, HypothesisKind, Outcome, Verdict
 from avow.calculus import questions
 from avow.calculus.certificates import Certificates, existence_scope, requirement_scope
+from avow.calculus.chance import likely
 from avow.calculus.composition import Composition, argument, asked, composed
 from avow.calculus.derivation import Derivation, Goal, Rule, SideCondition
 from avow.calculus.discharge import Bounds, Claim
 from avow.calculus.questions import Answer
-from avow.calculus.requirements import requirement_question, supports
+from avow.calculus.required import requirement_question, unshown
+from avow.calculus.requirements import supports
 from avow.calculus.rules import ONE_OUTPUT, PERSISTENCE
 from avow.calculus.subsystem_contracts import innermost
 from avow.calculus.variables import OBSERVED, Frame
@@ -40,7 +42,7 @@ from avow.language.subterms import ports_of
 from avow.language.terms import Role
 from avow.sanity.claims import node_key, triggers
 from avow.solving.limits import effort_told
-from avow.system.plan import System
+from avow.system.plan import Requirement, System
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,7 +104,9 @@ def reestablished(certificates: Certificates, obligation: str) -> Reestablished 
     not establish it."""
     _, _, kind, name = obligation.split("/", 3)
     if kind == Kind.REQUIREMENT:
-        scope = requirement_scope(name)
+        scope, frame = requirement_scope(name), certificates.composition.frame
+        if any(r.id == name and unshown(frame, r) for r in frame.system.plan.requirements):
+            return None
         return _all_told(obligation, [certificates.kept_for(scope, Claimed.REQUIREMENT, name)], scope)
     if certificates.parts(name):
         scope = existence_scope(name)
@@ -214,6 +218,17 @@ def _environment_tasks(composition: Composition) -> Iterator[Task]:
                 span=entry.span,
             )
     reasons = {entry.port: entry.because for entry in frame.system.plan.environment}
+    for requirement in frame.system.plan.requirements:
+        if requirement.probability is not None and (because := requirement.probability.independent):
+            names = f"these fail independently of each other: {', '.join(likely(frame.system, requirement))}"
+            yield _task(
+                frame,
+                f"independent.{requirement.id}",
+                names,
+                ("independent", names, requirement.probability.words),
+                questions.EnvironmentQuestion(because),
+                span=requirement.span,
+            )
     for name, ports in composition.left_to_environment():
         node = frame.node(name.node)
         clause = node.clause(name.clause)
@@ -368,7 +383,16 @@ class _Resting:
                 shown = (self.named(Claimed.ASSUMPTION, mark, node) for node, mark in answer.established.shown if node)
                 found |= dict.fromkeys(self.discharging(*name.split(".")) for name in shown)
             found |= dict.fromkeys(self.constants(answer.established, required))
+        for requirement in (r for r in self.composition.frame.system.plan.requirements if r.id == required):
+            found |= dict.fromkeys(self.likely(requirement))
         return tuple(found)
+
+    def likely(self, requirement: Requirement) -> Iterator[Hypothesis]:
+        """The guarantees of whose probabilities the requirement's is composed."""
+        for name in likely(self.composition.frame.system, requirement):
+            yield from self.guarantee(*name.split("."))
+        if requirement.probability is not None and requirement.probability.independent:
+            yield self.composed(f"independent.{requirement.id}")
 
     def constants(self, established: Established, required: str) -> Iterator[Hypothesis]:
         """Hypotheses that inputs mentioned in a proof's clauses do not change, if the plan declares them constant."""

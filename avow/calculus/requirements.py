@@ -15,15 +15,17 @@ checked the same way over the runs of the plan's scenario.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import field, replace
 from itertools import product
 
+from avow.base.diagnostics import Span
 from avow.base.files import sha256
 from avow.base.plain import listed
 from avow.base.records import dataclass
 from avow.base.tuning.bounds import PROPERTY_ATOMS, REQUIREMENT_MUTANTS
 from avow.base.tuning.effort import CONSISTENT_EFFORT, QUICK_EFFORT
 from avow.base.verdict import Counterexample, Verdict
+from avow.calculus import chance
 from avow.calculus.certificates import hint_of, labels
 from avow.calculus.composition import Composition
 from avow.calculus.derivation import Case, Phase, about_memory
@@ -39,6 +41,7 @@ from avow.calculus.trials import composes
 from avow.calculus.variables import Frame, Observed, framed, system_term
 from avow.evidence.record import COMPOSES
 from avow.formulas.formula import digest, negation
+from avow.language.contract import Clause
 from avow.language.printer import show_term
 from avow.language.terms import FALSE, Term
 from avow.sanity.claims import triggers
@@ -46,7 +49,15 @@ from avow.sanity.mutants import mutants
 from avow.solving.questions import Entailment, solve
 from avow.system.formulas import environment_assumptions
 from avow.system.plan import Requirement
-from avow.system.temporal import Operator, Property, State, Temporal, parse_property, show_property, states_of
+from avow.system.temporal import (
+    Operator,
+    Property,
+    State,
+    Temporal,
+    parse_property,
+    show_property,
+    states_of,
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,6 +74,10 @@ class FormulaQuestion:
     required: bool = False
     """Whether the formula is a requirement's, which must not be vacuous; a demand of a refinement may follow from
     anything."""
+    spoken: Term | None = None
+    """What must not be vacuous, if it is not the formula."""
+    likely: Mapping[str, Clause] = field(default_factory=dict)
+    """The guarantees with a probability that the formula takes as kept."""
 
     def __call__(self, composition: Composition, bounds: Bounds) -> Answer:
         """Tries each method briefly first: one may be quick where another never succeeds. A run over the plan's
@@ -74,10 +89,15 @@ class FormulaQuestion:
         if not self.required or answer.verdict is not Verdict.PROVED or answer.vacuous:
             return answer
         frame, assumed = composition.frame, composition.assumed(self.name)
-        known = self.known(frame, _every_guarantee(frame))
-        why = _formula_says_nothing(frame, self.formula, known, assumed, bounds)
+        kept = {
+            name: system_term(frame, chance.over_system(c.spoken, name.partition(".")[0]))
+            for name, c in self.likely.items()
+        }
+        known = self.known(frame, _every_guarantee(frame)) | kept
+        spoken = self.spoken or self.formula
+        why = _formula_says_nothing(frame, spoken, known, assumed, bounds)
         if answer.established is not None:
-            more = composes(frame, system_term(frame, self.formula), answer.established)
+            more = composes(frame, system_term(frame, spoken), answer.established)
             answer = replace(answer, details={**answer.details, COMPOSES: more})
         why = why or (self.dead_condition(composition, bounds) if self.name in frame.observed else "")
         return _says_nothing(answer, why or self.unused_support(frame, answer, assumed))
@@ -297,17 +317,10 @@ def _says_nothing(answer: Answer, why: str) -> Answer:
     return replace(answer, vacuous=True, summary=f"says nothing: {why}") if why else answer
 
 
-def requirement_question(
-    composition: Composition, requirement: Requirement
-) -> FormulaQuestion | TemporalQuestion | None:
-    """The question for a requirement; None if it is prose. Raises Rejected if a formula is wrong."""
-    frame = composition.frame
-    if requirement.formula is not None:
-        return replace(formula_question(frame, requirement.id, supports(composition, requirement)), required=True)
-    if requirement.temporal is not None:
-        formula = parse_property(requirement.temporal, frame.system.contract, requirement.formula_span)
-        return TemporalQuestion(requirement.id, formula, show_property(formula), sha256(_meaning(formula)))
-    return None
+def temporal_question(frame: Frame, name: str, text: str, span: Span | None) -> TemporalQuestion:
+    """The question for a temporal property. Raises Rejected if it is wrong."""
+    formula = parse_property(text, frame.system.contract, span)
+    return TemporalQuestion(name, formula, show_property(formula), sha256(_meaning(formula)))
 
 
 def supports(composition: Composition, requirement: Requirement) -> tuple[str, ...]:

@@ -14,6 +14,7 @@ from typing import TypeVar
 
 from avow.base.files import sha256
 from avow.base.records import dataclass
+from avow.calculus.chance import while_kept
 from avow.formulas.formula import digest, free_variables, substitute
 from avow.formulas.temporal.ages import CLOCK
 from avow.formulas.temporal.cell import CELL, Cell, Unsaid
@@ -359,7 +360,7 @@ def frame(system: System) -> Frame:
     """The frame of a system. Raises Rejected if the plan's formulas are wrong."""
     graph = dataflow(system)
     required = {
-        r.id: parse_state(r.formula, system.contract, r.formula_span)
+        r.id: while_kept(system, r, parse_state(r.formula, system.contract, r.formula_span))
         for r in system.plan.requirements
         if r.formula is not None
     }

@@ -14,14 +14,14 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 
 from avow.base.graphs import components
+from avow.calculus.chance import over_system
 from avow.calculus.variables import Frame
-from avow.formulas.formula import conjunction, negation, substitute
+from avow.formulas.formula import conjunction, negation
 from avow.formulas.temporal.ages import CLOCK
 from avow.formulas.temporal.cell import CELL
 from avow.formulas.temporal.clock import GOES_ON, is_arrival
 from avow.kernel.statements import Claimed, Place, Wiring
 from avow.language.sorts import BOOL, Sort
-from avow.language.subterms import ports_of
 from avow.language.terms import Role, Term, Variable
 from avow.sanity.claims import triggers
 from avow.system.formulas import initial_condition
@@ -89,26 +89,19 @@ def _beginning(frame: Frame, group: Iterable[str]) -> Term:
     members = frozenset(group)
     first: dict[str, Edge] = {str(e.source): e for e in frame.graph.edges if e.delayed and e.source.node in members}
     found = [(e.source.node, initial_condition(frame.system, e)) for e in first.values()]
-    return conjunction([_qualified(condition, node) for node, condition in found if condition is not None])
+    return conjunction([over_system(condition, node) for node, condition in found if condition is not None])
 
 
 def _situations(frame: Frame, group: Sequence[str], node: str, clause: str) -> Iterator[tuple[Claimed, str, str, Term]]:
     """Two claims for each situation that a guarantee of a node in a cycle is about: that it arises while all nodes of
     the cycle keep their contracts, and that its node's own contract excludes it, which composition does not change."""
-    contracts = {name: [_qualified(each.formula, name) for each in frame.node(name).clauses] for name in group}
+    contracts = {name: [over_system(each.formula, name) for each in frame.node(name).clauses] for name in group}
     everything = [term for terms in contracts.values() for term in terms]
-    everything += [_qualified(assumed.formula, assumed.node) for assumed in frame.assumed]
+    everything += [over_system(assumed.formula, assumed.node) for assumed in frame.assumed]
     for k, situation in enumerate(triggers(frame.node(node).clause(clause).formula)):
-        name, there = f"joint.{node}.{clause}.{k}", _qualified(situation, node)
+        name, there = f"joint.{node}.{clause}.{k}", over_system(situation, node)
         yield Claimed.POSSIBLE, "", name, conjunction([*everything, there])
         yield Claimed.IMPOSSIBLE, "", name, negation(conjunction([*contracts[node], there]))
-
-
-def _qualified(term: Term, node: str) -> Term:
-    """A formula of a node over ``node.port``."""
-    return substitute(
-        term, {v: Variable(v.role, f"{node}.{v.name}", v.sort) for v in ports_of(term) if v.role is not Role.BOUND}
-    )
 
 
 def _ports(frame: Frame) -> dict[tuple[Role, str, str], Place]:

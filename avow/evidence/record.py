@@ -36,6 +36,9 @@ RATE = "rate"
 LIKELY = "least probability"
 """Among the details of evidence that counts no trials, for a guarantee with a probability: its bound."""
 
+LIKELY_LEAVES = "composed of"
+"""Key of `details`: the guarantees with a probability that a requirement's is composed of."""
+
 COMPOSES = "composes"
 """Among the details of a requirement's proof: the samples that its failure rate may be composed of
 (`avow.calculus.trials`)."""

@@ -16,6 +16,7 @@ from dataclasses import dataclass, field
 from decimal import ROUND_CEILING, Context, Decimal
 from enum import StrEnum
 from fractions import Fraction
+from math import prod
 
 from avow.base import codec
 from avow.kernel.check import Refused
@@ -39,10 +40,23 @@ class Stratum:
 
 @dataclass(frozen=True, slots=True)
 class Leaf:
-    """A claim that was sampled, by its name, and its sample."""
+    """A claim by its name, and its sample; or, without one, a claim that is shown to fail with a probability of at most
+    `stated` (an exact decimal) in a trial."""
 
     claim: str
     strata: tuple[Stratum, ...]
+    stated: str = field(default="", metadata=codec.LATER)
+    trial: Trial = field(default=Trial.STEP, metadata=codec.LATER)
+
+
+@dataclass(frozen=True, slots=True)
+class Likely:
+    """A claim, by its name, that holds with a probability of at least `least` (an exact decimal): at a step, whatever
+    happened before, or at all steps of a run."""
+
+    claim: str
+    least: str
+    trial: Trial
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,16 +94,35 @@ def shows(failures: int, trials: int, bound: Fraction, confidence: Fraction) -> 
     return sensible and (bound >= 1 or tail(failures, trials, bound) <= 1 - confidence)
 
 
+def together(leaves: Sequence[Likely], steps: int | None, *, independent: bool = False) -> Fraction:
+    """The least probability that all of the claims hold: at each step (1), at all of the first `steps` steps, or in a
+    run (None). At a step, claims fail together at most as often as their failures add up (the union bound), and so do
+    steps. `independent`: claims fail independently of each other, given what happened before; then probabilities are
+    multiplied. Raises Refused if a claim's trials cannot be counted so."""
+    wrong = {1: Trial.RUN, None: Trial.STEP}.get(steps)
+    for leaf in leaves:
+        if leaf.trial is wrong or not 0 < Fraction(leaf.least) < 1:
+            raise Refused(f"{leaf.claim}: {leaf.least} in a {leaf.trial} does not compose")
+    times = {Trial.STEP: steps or 0, Trial.RUN: 1}
+    if independent:
+        return prod((Fraction(leaf.least) ** times[leaf.trial] for leaf in leaves), start=Fraction(1))
+    return max(1 - sum((times[leaf.trial] * (1 - Fraction(leaf.least)) for leaf in leaves), Fraction(0)), Fraction(0))
+
+
 def composed(leaves: Sequence[Leaf], *, at_once: bool) -> Rate:
     """The rate of a claim that fails in a run only if a leaf does (`at_once`: at a step only if one does then). Raises
     Refused if a sample does not show its bound, or if trials do not add up. If the doubts add up to 1 or more, nothing
     is known: the bound is 1."""
     bound = doubt = Fraction(0)
-    trials = {each.trial: leaf.claim for leaf in leaves for each in leaf.strata}
+    trials = {leaf.trial: leaf.claim for leaf in leaves if leaf.stated}
+    trials |= {each.trial: leaf.claim for leaf in leaves for each in leaf.strata}
     if Trial.STEP in trials and (Trial.RUN in trials or not at_once):
         why = "others are whole runs" if Trial.RUN in trials else "what fails at an earlier step may count"
         raise Refused(f"a trial of {trials[Trial.STEP]} is a single step, and {why}")
     for leaf in leaves:
+        if leaf.stated and not leaf.strata and 0 <= Fraction(leaf.stated) <= 1:
+            bound += Fraction(leaf.stated)
+            continue
         if not leaf.strata:
             raise Refused(f"{leaf.claim} has no sample")
         for each in leaf.strata:

@@ -67,6 +67,7 @@ TRUSTED = {
     "wiring of a system as the kernel is told it (avow/calculus)": (
         "calculus/wiring.py",
         "calculus/variables.py",
+        "calculus/chance.py",
         "sanity/claims.py",
     ),
     "which claim an obligation is, and its certificate (avow/calculus)": (

@@ -3,14 +3,14 @@ scenario's values have the required types; all located."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 
 from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.base.plain import exact
 from avow.base.suggestions import suggest
 from avow.base.tuning.bounds import VALUES_LOOKED_AT
 from avow.language import sorts as s
-from avow.language.contract import Contract, Node, Port
+from avow.language.contract import Chance, Contract, Node, Port
 from avow.language.load import parse_term
 from avow.language.printer import show_type
 from avow.system.hazards import check_mitigations
@@ -90,8 +90,11 @@ def _environment(plan: Plan, root: Piece, nodes: dict[str, Node]) -> Iterator[Di
 
 def _requirements(plan: Plan, root: Piece, nodes: dict[str, Node]) -> Iterator[Diagnostic]:
     goals = [*(goal.name for goal in plan.compose), *(subsystem.name for subsystem in plan.subsystems)]
-    likely = {f"{n.name}.{g.name}" for n in nodes.values() for g in n.guarantees if g.chance is not None}
+    likely = {f"{n.name}.{g.name}": g.chance for n in nodes.values() for g in n.guarantees if g.chance is not None}
     for name, _, requirement in root.keyed("requirements"):
+        asked = requirement.at("probability")
+        if asked is not None:
+            yield from _unlikely(f"requirements.{name}.probability", asked, requirement, likely)
         for item in requirement.each("supported_by"):
             owner, dot, _ = item.text.partition(".")
             if item.text in goals or (not dot and owner in nodes):
@@ -100,10 +103,32 @@ def _requirements(plan: Plan, root: Piece, nodes: dict[str, Node]) -> Iterator[D
             known = [f"{n}.{g.name}" for n in nodes for g in nodes[n].guarantees if n == owner or owner not in nodes]
             if item.text not in known:
                 yield _unknown(where, item.text, known if owner in nodes else [*nodes, *goals, *known], item.span)
-            elif item.text in likely and (requirement.at("formula") or requirement.at("temporal")):
+            elif item.text in likely and asked is None and (requirement.at("formula") or requirement.at("temporal")):
                 message = f"{where}: {item.text} holds with a probability, and no proof of a formula may use it"
-                hint = "leave it out here, or leave out the formula and argue the requirement"
+                hint = "give the requirement a `probability`, or leave this guarantee out here"
                 yield Diagnostic("PLAN141", message, item.span, hint=hint)
+
+
+def _unlikely(where: str, asked: Piece, requirement: Piece, likely: Mapping[str, Chance]) -> Iterator[Diagnostic]:
+    """Why a requirement's probability cannot be composed of those of guarantees."""
+    if requirement.at("formula") is None:
+        yield Diagnostic("PLAN142", f"{where}: there is no `formula` that has it", asked.span, hint="add a `formula`")
+    below = {item.text: likely[item.text] for item in requirement.each("supported_by") if item.text in likely}
+    if not below:
+        hint = "name one as `node.guarantee`, or leave out `probability`"
+        message = f"{where}: no guarantee with a probability is under `supported_by`"
+        yield Diagnostic("PLAN142", message, asked.span, hint=hint)
+    if len(kinds := [key for key in ("given", "steps", "per_run") if asked.at(key) is not None]) > 1:
+        message = f"{where}: {' and '.join(kinds)} exclude one another"
+        yield Diagnostic("PLAN142", message, asked.span, hint=f"keep one of {', '.join(kinds)}")
+        return
+    in_a_run, steps = asked.at("per_run") is not None, asked.at("steps") is not None
+    for guarantee, chance in below.items() if in_a_run or not steps else ():
+        if chance.per_run != in_a_run:
+            has, wanted = ("a whole run", "each step") if chance.per_run else ("each step", "a whole run")
+            message = f"{where}: the probability of {guarantee} is of {has}, and that of the requirement of {wanted}"
+            hint = "`steps: 100` asks about the first 100 steps together, and composes both kinds"
+            yield Diagnostic("PLAN142", message, asked.span, hint=hint)
 
 
 def _assumptions(plan: Plan, root: Piece) -> Iterator[Diagnostic]:

@@ -22,6 +22,7 @@ from avow.language.lints import uncarried, unspoken
 from avow.ros.launch import Launched
 from avow.ros.names import Resolver
 from avow.ros.quality import Quality
+from avow.system.probability import Probability
 
 
 @dataclass(frozen=True, slots=True)
@@ -287,6 +288,8 @@ class Requirement:
     """Digest of what the contract says about the names under `supported_by`: see `avow.system.links`."""
     source: str = ""
     """The document that it comes from, and the place in it."""
+    probability: Probability | None = None
+    """None: the formula has to hold at every step, without exception."""
 
     @property
     def sentence_digest(self) -> str:
@@ -296,7 +299,9 @@ class Requirement:
     @property
     def formula_digest(self) -> str:
         """Digest of the formula or temporal property, and of what is linked to it: names, and their meaning."""
-        return sha256(repr((self.formula or "", self.temporal or "", *sorted(self.supported_by), self.linked)))[:16]
+        likely = (self.probability.words,) if self.probability else ()
+        parts = (self.formula or "", self.temporal or "", *likely, *sorted(self.supported_by), self.linked)
+        return sha256(repr(parts))[:16]
 
     @property
     def validated(self) -> bool:

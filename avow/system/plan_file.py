@@ -40,6 +40,7 @@ from avow.system.plan import (
     Validation,
     is_wild,
 )
+from avow.system.probability import Probability
 from avow.system.schema import check_shape, without_faults
 from avow.system.statements import read_statements, wrong_words
 from avow.system.strict_yaml import Piece, read_yaml
@@ -312,7 +313,21 @@ class _PlanReader:
                 (formula or temporal or piece).inner,
                 self.validation(piece.at("validation")),
                 source=piece.said("source") or "",
+                probability=self.probability(piece.at("probability")),
             )
+
+    def probability(self, piece: Piece | None) -> Probability | None:
+        if piece is None or piece.entries is None:
+            return Probability(piece.text) if piece is not None else None
+        words, given = piece.words(), piece.at("given")
+        return Probability(
+            words["at_least"],
+            words.get("given", ""),
+            int(words.get("steps", 1)),
+            "per_run" in words,
+            words.get("independent", ""),
+            given.inner if given else None,
+        )
 
     def validation(self, piece: Piece | None) -> Validation | None:
         if piece is None:
