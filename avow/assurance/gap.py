@@ -232,6 +232,9 @@ def suggest(view: ObligationView, demand: Demand | None, facts: Facts) -> Sugges
             )
     if demand is None:
         if view.obligation.kind is Kind.REQUIREMENT:
+            for record in view.records:
+                if record.verdict is Verdict.UNKNOWN:
+                    return Suggestion(f"see why it is unknown: {_clipped(record.summary)}", cost=20)
             return Suggestion("add what it rests on under `supported_by`, or state it as a formula", cost=20)
         if view.obligation.kind is Kind.COMPOSITION and _wants_a_reason(view):
             return Suggestion(reason_wanted(view.obligation.name), cost=5)

@@ -272,7 +272,7 @@ class RequirementView:
     @property
     def formal(self) -> str:
         """Its formula, with the probability that is asked, or temporal property; empty if it is prose."""
-        return f"{self.formula}\n{self.probability.words}" if self.probability else self.formula or self.temporal
+        return f"{self.formula}, {self.probability.words}" if self.probability else self.formula or self.temporal
 
     @property
     def meaning(self) -> str:
