@@ -50,6 +50,7 @@ from avow.pipeline.state import State
 from avow.pipeline.workload import LISTED, Survey, write_obligations
 from avow.report import render_all, write_index
 from avow.report.page import fill
+from avow.report.parts import Parts
 from avow.report.short import terminal_lines
 from avow.report.wording import tally
 from avow.system.folding import seen
@@ -89,7 +90,8 @@ def render(state: State, surveyed: Survey) -> Result:
     else:
         case = build(state, surveyed, basis)
         state.cases[surveyed.system.name] = key, case
-        written = render_all(case, state.workspace.report(surveyed.system.name), signing_key())
+        place = state.workspace.report(surveyed.system.name)
+        written = render_all(case, place, signing_key(), Parts(None if state.run.fresh else place, report_digest()))
         result = _summarise(state, surveyed, case)
         pages = write_indexes(state.workspace, surveyed.catalogue.works, case)
         listed = state.workspace.artifacts / surveyed.system.name / LISTED

@@ -57,7 +57,7 @@ def reading_digest() -> str:
 
 def report_digest() -> str:
     """Digest of the code and templates behind a report, given the evidence."""
-    return _digest(_of(("assurance", "report", "evidence", "pipeline")))
+    return _digest(_of((*_ROOMS_OF_BACKENDS, "assurance", "report", "evidence", "pipeline")))
 
 
 TRUSTED = {

@@ -20,16 +20,17 @@ from avow.base.files import sha256, write
 from avow.base.workspace import WRITTEN_ON_DEMAND
 from avow.evidence.envelope import seal_lines
 from avow.report import answers_page, exchange, markdown, page, short
+from avow.report.parts import NOTHING_KEPT, Parts
 
 ATTESTATION = "attestation.jsonl"
 
 
-def render_all(case: Case, folder: Path, key: Path | None = None) -> tuple[Path, ...]:
+def render_all(case: Case, folder: Path, key: Path | None = None, parts: Parts = NOTHING_KEPT) -> tuple[Path, ...]:
     """Write the formats of one case into `folder`. Files that are written on demand show another state and are removed.
     With a private key the attestations are signed, each in an envelope on a line of its own. Raises OSError, and
     Rejected for a key that cannot be used."""
     written = []
-    for name, content in formats(case):
+    for name, content in formats(case, parts):
         if key is not None and name == ATTESTATION:
             content = seal_lines(content, key)
         write(folder / name, content)
@@ -38,6 +39,7 @@ def render_all(case: Case, folder: Path, key: Path | None = None) -> tuple[Path,
         (folder / name).unlink(missing_ok=True)
     for name in left_over(folder, (path.name for path in written)):
         (folder / name).unlink()
+    parts.keep()
     return tuple(written)
 
 
@@ -46,23 +48,23 @@ def left_over(folder: Path, names: Iterable[str]) -> list[str]:
     return sorted({path.name for path in folder.glob("node-*.html")} - set(names))
 
 
-def formats(case: Case) -> Iterator[tuple[str, str]]:
-    """The formats that every run writes, by file name. Same case, same text."""
-    for name, content in _formats(case):
+def formats(case: Case, parts: Parts = NOTHING_KEPT) -> Iterator[tuple[str, str]]:
+    """The formats that every run writes, by file name. Same case, same text, whatever parts are kept."""
+    for name, content in _formats(case, parts):
         yield name, content.encode("utf-8", "replace").decode()  # a tool's text may hold half a character
 
 
-def _formats(case: Case) -> Iterator[tuple[str, str]]:
-    as_json = exchange.render_json(case)
+def _formats(case: Case, parts: Parts) -> Iterator[tuple[str, str]]:
+    as_json = exchange.render_json(case, parts)
     yield "report.json", as_json
     yield "index.html", answers_page.render_answers(case, sha256(as_json))
-    yield "argument.html", answers_page.render_argument(case, sha256(as_json))
-    yield "claims.html", page.render_page(case, sha256(as_json))
-    yield from page.render_details(case)
+    yield "argument.html", answers_page.render_argument(case, sha256(as_json), parts)
+    yield "claims.html", page.render_page(case, sha256(as_json), parts)
+    yield from page.render_details(case, parts)
     yield "report.md", markdown.render_markdown(case)
     yield "comment.md", short.comment(case)
     yield "findings.sarif", exchange.render_sarif(case, findings_only=True)
-    yield "junit.xml", exchange.render_junit(case)
+    yield "junit.xml", exchange.render_junit(case, parts)
     yield ATTESTATION, exchange.render_attestation(case)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 from urllib.parse import quote
 
@@ -12,7 +12,7 @@ from markupsafe import Markup
 
 from avow.assurance.answers import MEANINGS, Assumption, Level, NodeBasis, SupposedLine, Tone
 from avow.assurance.first_screen import basis_of
-from avow.assurance.model import Case, ObligationView
+from avow.assurance.model import Case, NodeView, ObligationView
 from avow.assurance.relied import kept_apart, shade
 from avow.assurance.state import baseline_of
 from avow.base.plain import count, listed
@@ -21,8 +21,9 @@ from avow.evidence.record import Evidence
 from avow.evidence.status import Status, weigh
 from avow.report import wording
 from avow.report.goals import doubts
-from avow.report.modules import NodeModule, RequirementModule, conditions, node_modules, requirement_modules
-from avow.report.page import fill, known_pages
+from avow.report.modules import RequirementModule, conditions, node_modules, requirement_modules
+from avow.report.page import fill, known_pages, pages
+from avow.report.parts import NOTHING_KEPT, Parts
 
 KINDS = 6
 """Kinds of deficit in words on the first screen, the weightiest first: a link counts and explains all."""
@@ -70,8 +71,13 @@ def render_answers(case: Case, json_digest: str = "") -> str:
     )
 
 
-def render_argument(case: Case, json_digest: str = "") -> str:
+def render_argument(case: Case, json_digest: str = "", parts: Parts = NOTHING_KEPT) -> str:
     """The page behind the first: requirements and nodes with their evidence, each assumption, and what is not shown."""
+    bases, nodes = {basis.node: basis for basis in case.answers.bases}, []
+    for node, guarantees in ((module.node, module.guarantees) for module in node_modules(case)):
+        basis = bases.get(node.name) or basis_of(node, case)
+        said = {view.id: told.reason for view in guarantees if (told := case.said(view.id)) and told.reason}
+        nodes.append(parts.text(node.name, "argument", _node, node, guarantees, basis, said))
     return _render(
         "argument.html.j2",
         case,
@@ -79,12 +85,10 @@ def render_argument(case: Case, json_digest: str = "") -> str:
         conditions=conditions(case),
         doubts=doubts(case),
         full_reason=full_reason,
-        kept_apart=kept_apart,
         shade=shade,
         some=listed,
-        where=wording.where,
         modules=[_requirement(case, m) for m in requirement_modules(case)],
-        node_modules=[_node(case, m) for m in node_modules(case)],
+        node_modules=nodes,
         said_of=lambda name: ((said := case.said(name)) and said.reason) or "",
         word=_word,
         words=WORDS,
@@ -139,14 +143,20 @@ def _requirement(case: Case, module: RequirementModule) -> dict[str, Any]:
     return {**fields, "own": own}
 
 
-def _node(case: Case, module: NodeModule) -> dict[str, Any]:
-    basis = basis_of(module.node, case)
-    return {
-        "node": module.node,
-        "basis": basis,
-        "guarantees": module.guarantees,
-        "boxes": _boxes(module.guarantees, basis),
-    }
+def _node(node: NodeView, guarantees: Sequence[ObligationView], basis: NodeBasis, said: Mapping[str, str]) -> str:
+    return fill(
+        "argument_node.html.j2",
+        node=node,
+        guarantees=guarantees,
+        basis=basis,
+        said=said,
+        boxes=_boxes(guarantees, basis),
+        kept_apart=kept_apart,
+        known=pages(guarantees),
+        shade=shade,
+        where=wording.where,
+        word=_word,
+    )
 
 
 def _boxes(views: Sequence[ObligationView], basis: NodeBasis) -> list[tuple[Tone, tuple[str, str]]]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 from urllib.parse import quote
@@ -12,19 +13,29 @@ from avow.assurance.codec import to_json
 from avow.assurance.model import Case, Gate, ObligationView, RequirementView
 from avow.assurance.naming import sanity_property, short
 from avow.assurance.summary import decisive
+from avow.base import codec
 from avow.base.files import sha256
 from avow.base.records import dataclass
 from avow.base.rendering import sarif_place
 from avow.evidence.obligation import Kind
 from avow.evidence.status import Status
-from avow.report.layout import json_text
+from avow.report.layout import Written, json_text
 from avow.report.page import fill
+from avow.report.parts import NOTHING_KEPT, Parts
 from avow.report.wording import banner_tone, of_nodes, tone
 
 
-def render_json(case: Case) -> str:
+def render_json(case: Case, parts: Parts = NOTHING_KEPT) -> str:
     """The whole case (schema: docs/schemas/case.schema.json)."""
-    return json_text(to_json(case))
+    whole = to_json(replace(case, obligations=()))
+    lines = {node: iter(parts.text(node, "json", _lines, own).split("\n")) for node, own in of_nodes(case).items()}
+    whole["obligations"] = [Written(next(lines[view.obligation.node])) for view in case.obligations]
+    return json_text(whole)
+
+
+def _lines(views: Sequence[ObligationView]) -> str:
+    """Each view as JSON, on a line of its own."""
+    return "\n".join(json.dumps(codec.to_json(view)) for view in views)
 
 
 def _result_of(case: Case) -> str:
@@ -53,14 +64,26 @@ class _Row:
     seconds: float = 0.0
 
 
-def render_junit(case: Case) -> str:
+def render_junit(case: Case, parts: Parts = NOTHING_KEPT) -> str:
     """A suite for the gates, one for the requirements, and one for each node. Refuted claims fail; claims that are not
     shown are skipped, never passed: the gates decide whether that matters."""
-    suites = [("gates", list(map(_of_gate, case.gates)))]
+    groups = [("gates", list(map(_of_gate, case.gates)))]
     if case.requirements:
-        suites.append(("requirements", [_of_requirement(r, case) for r in case.requirements]))
-    suites += [(node, list(map(_of_claim, views))) for node, views in of_nodes(case.obligations).items()]
-    return fill("junit.xml.j2", case=case, suites=suites, result=_result_of(case))
+        groups.append(("requirements", [_of_requirement(r, case) for r in case.requirements]))
+    properties = {"result": _result_of(case), "verdict": case.answers.told}
+    suites = [_suite(case.system, name, rows, {} if at else properties) for at, (name, rows) in enumerate(groups)]
+    suites += [parts.text(node, "junit", _of_node, case.system, own) for node, own in of_nodes(case).items()]
+    outcomes = [*(row.outcome for _, rows in groups for row in rows), *map(_outcome, case.obligations)]
+    return fill("junit.xml.j2", system=case.system, outcomes=outcomes, suites=suites)
+
+
+def _of_node(system: str, views: Sequence[ObligationView]) -> str:
+    return _suite(system, views[0].obligation.node, list(map(_of_claim, views)), {})
+
+
+def _suite(system: str, name: str, rows: Sequence[_Row], properties: Mapping[str, str]) -> str:
+    outcomes = [row.outcome for row in rows]
+    return fill("suite.xml.j2", system=system, name=name, rows=rows, outcomes=outcomes, properties=properties)
 
 
 def _of_gate(gate: Gate) -> _Row:
@@ -80,14 +103,19 @@ def _of_requirement(requirement: RequirementView, case: Case) -> _Row:
 
 def _of_claim(view: ObligationView) -> _Row:
     o, message = view.obligation, f"{view.word}: {decisive(view)}"
-    row = _Row(f"{o.node}.{o.kind}", o.name, "", seconds=sum(r.seconds for r in view.records))
-    if _fails(view) and not view.advice:
-        return replace(row, outcome="failure", message=message, type=view.standing.value)
-    if view.standing is Status.ERROR:
-        return replace(row, outcome="error", message=message, type="error")
-    if not view.passes:
-        return replace(row, outcome="skipped", message=f"{view.handled}; {message}" if view.handled else message)
+    row = _Row(f"{o.node}.{o.kind}", o.name, _outcome(view), seconds=sum(r.seconds for r in view.records))
+    match row.outcome:
+        case "failure" | "error":
+            return replace(row, message=message, type=view.standing.value)
+        case "skipped":
+            return replace(row, message=f"{view.handled}; {message}" if view.handled else message)
     return row
+
+
+def _outcome(view: ObligationView) -> str:
+    if _fails(view) and not view.advice:
+        return "failure"
+    return "error" if view.standing is Status.ERROR else "" if view.passes else "skipped"
 
 
 # -- SARIF ----------------------------------------------------------------------------------------------------------
@@ -190,7 +218,7 @@ def _sarif_level(view: ObligationView) -> tuple[str, str]:
 def render_attestation(case: Case) -> str:
     """in-toto statements (v1) with test-result predicates (v0.1): one for the system, then one for each node."""
     every = [_statement(case, "", list(case.obligations), _result_of(case))]
-    for node, own in of_nodes(case.obligations).items():
+    for node, own in of_nodes(case).items():
         views = [view for view in own if not view.advice]
         good = all(view.passes for view in views)
         bad = any(map(_fails, views))

@@ -10,7 +10,6 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import cache
 from importlib import resources
-from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +18,7 @@ from jinja2.bccache import Bucket, BytecodeCache
 from markupsafe import Markup, escape
 
 from avow.assurance.answers import MEANINGS, Tone
-from avow.assurance.model import Case, ObligationView, OpenItem
+from avow.assurance.model import Case, Handled, ObligationView, OpenItem
 from avow.assurance.naming import short
 from avow.assurance.remarks import REMARK
 from avow.assurance.traceability import Row
@@ -27,16 +26,18 @@ from avow.backend_kit.timeline import in_words, picture, timelines
 from avow.base.files import sha256, write
 from avow.base.notes import cache_folder, sealed, unsealed
 from avow.base.plain import count
+from avow.base.records import dataclass
 from avow.base.remembered import by_identity
 from avow.base.tuning.shown import FINDING_CHARACTERS, GUARANTEE_ROWS, OBLIGATIONS_IN_FULL, ROWS_UNFOLDED
 from avow.evidence.obligation import SYSTEM_LEVEL, Kind
 from avow.evidence.record import IN_PART
 from avow.evidence.status import Status, weigh
 from avow.report import example, source, wording
+from avow.report.parts import NOTHING_KEPT, Parts
 from avow.report.wording import history
 
 KINDS = (Kind.GUARANTEE, Kind.SANITY, Kind.COMPOSITION, Kind.REQUIREMENT, Kind.PROGRAM, Kind.WELL_FORMED)
-
+_KIND = {kind: at for at, kind in enumerate(KINDS)}
 
 _Stands = list[tuple[str, str, int]]
 _Matrix = list[tuple[str, str, list[tuple[ObligationView, list[tuple[str, Status | None]]]]]]
@@ -135,16 +136,20 @@ def fill(template: str, **given: Any) -> str:
     return environment().get_template(template).render(given)
 
 
-def render_page(case: Case, json_digest: str = "") -> str:
+def render_page(case: Case, json_digest: str = "", parts: Parts = NOTHING_KEPT) -> str:
     """The overview of every claim. Deterministic: same case, same bytes. `json_digest` is the digest of the report.json
     beside it: with it no edit of that file goes unnoticed, not even of a part that no other format shows."""
     matrix = _matrix(case)
     listed = [item for item in case.open_items if not item.advice]
     nodes = by_node(case)
+    groups = [
+        (node, _stands(views), Markup(parts.text(node, "claims", _rows, views)))  # a template's own text
+        for node, views in nodes.items()
+    ]
     return _fill(
         "claims.html.j2",
         case,
-        groups=[(node, _stands(views), views) for node, views in nodes.items()],
+        groups=groups,
         total=len(case.obligations),
         counts=_counts(case.obligations),
         partly={(r.obligation, r.method) for v in case.guarantees for r in v.records if r.bound.get(IN_PART)},
@@ -167,24 +172,83 @@ def render_page(case: Case, json_digest: str = "") -> str:
     )
 
 
-def render_details(case: Case) -> Iterator[tuple[str, str]]:
+def _rows(views: Sequence[ObligationView]) -> str:
+    """A line for each claim of a node."""
+    return fill("rows.html.j2", views=views, known=pages(views))
+
+
+def render_details(case: Case, parts: Parts = NOTHING_KEPT) -> Iterator[tuple[str, str]]:
     """Every claim in full, as (file name, page): the whole system with its derivations, each node, the contracts.
 
     They name neither run nor date: a run that changes nothing of a node leaves its page unchanged.
     """
-    nodes = {SYSTEM_LEVEL: list[ObligationView](), **by_node(case)}
-    pages = [("the whole system" if node == SYSTEM_LEVEL else node, wording.page_of(node)) for node in nodes]
-    pages += [("contracts", "contracts.html")] if case.sources else []
-    shared = {
-        "pages": pages,
-        "full": _in_full([view for views in nodes.values() for view in views]),
-        "numbered": wording.numbered(case),
-        "places": source.places(case),
-        "remarked": _by_item([item for item in case.open_items if item.kind == REMARK]),
-    }
-    for (title, name), views in zip_longest(pages, nodes.values()):
-        kind = {"system.html": "system", "contracts.html": "contracts"}.get(name, "node")
-        yield name, _fill("details.html.j2", case, title=title, kind=kind, views=views or [], **shared)
+    nodes = {SYSTEM_LEVEL: tuple[ObligationView, ...](), **by_node(case)}
+    links = [("the whole system" if node == SYSTEM_LEVEL else node, wording.page_of(node)) for node in nodes]
+    links += [("contracts", "contracts.html")] if case.sources else []
+    head = _Head(case.title, case.run.avow_version, case.earlier, tuple(links), tuple(source.places(case).items()))
+    full = _in_full([view for views in nodes.values() for view in views])
+    numbered, known = wording.numbered(case), known_pages(case)
+    remarked = _by_item([item for item in case.open_items if item.kind == REMARK])
+    told = {name for finding in case.findings for name in finding.obligations}
+    for (title, name), (node, views) in zip(links, nodes.items(), strict=False):
+        beside = _Beside(
+            tuple(view.id for view in views if view.id in full),
+            {
+                text: numbered[text]
+                for v in views
+                for e in v.evidence
+                for text in e.entry.evidence.hypotheses
+                if text in numbered
+            },
+            {view.id: remarked[view.id] for view in views if view.id in remarked},
+            {view.id: case.said(view.id) for view in views if view.id in told},
+            {name: known[name] for view in views for name in view.below if name in known},
+        )
+        if node == SYSTEM_LEVEL:
+            yield name, _details(head, title, views, beside, case)
+        else:
+            yield name, parts.text(node, "page", _details, head, title, views, beside)
+    if case.sources:
+        yield "contracts.html", _fill("contracts.html.j2", case, head=head, title="contracts")
+
+
+@dataclass(frozen=True, slots=True)
+class _Head:
+    """What all pages of nodes have at their head, and the texts that they lead to."""
+
+    title: str
+    version: str
+    earlier: bool
+    pages: tuple[tuple[str, str], ...]
+    places: tuple[tuple[str, tuple[int, int]], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class _Beside:
+    """What other parts of the case say about a node's claims."""
+
+    full: tuple[str, ...]
+    numbered: Mapping[str, str]
+    remarked: Mapping[str, Sequence[OpenItem]]
+    said: Mapping[str, Handled | None]
+    known: Mapping[str, str]
+
+
+def _details(
+    head: _Head, title: str, views: Sequence[ObligationView], beside: _Beside, case: Case | None = None
+) -> str:
+    """A page of claims in full; with the case, the whole system's."""
+    return fill(
+        "details.html.j2",
+        head=head,
+        title=title,
+        views=views,
+        beside=beside,
+        places=dict(head.places),
+        full=frozenset(beside.full),
+        known={**beside.known, **(known_pages(case) if case else pages(views))},
+        case=case,
+    )
 
 
 def _fill(template: str, case: Case, **more: Any) -> str:
@@ -194,12 +258,19 @@ def _fill(template: str, case: Case, **more: Any) -> str:
 @by_identity(1)
 def known_pages(case: Case) -> dict[str, str]:
     """Each obligation, with the page that shows all of it."""
-    return {view.id: wording.page_of(view.obligation.node) for view in case.obligations}
+    return pages(case.obligations)
 
 
-def by_node(case: Case) -> dict[str, list[ObligationView]]:
+def pages(views: Iterable[ObligationView]) -> dict[str, str]:
+    return {view.id: wording.page_of(view.obligation.node) for view in views}
+
+
+@by_identity(1)
+def by_node(case: Case) -> Mapping[str, tuple[ObligationView, ...]]:
     """Every obligation, in reading order: the nodes in the contract's order, then the whole system."""
-    return wording.of_nodes(sorted(case.obligations, key=_reading_order(case)))
+    place = {node.name: at for at, node in enumerate(case.nodes)}
+    nodes = sorted(wording.of_nodes(case).items(), key=lambda found: place.get(found[0], len(place)))
+    return {node: tuple(sorted(views, key=lambda v: _KIND[v.obligation.kind])) for node, views in nodes}
 
 
 _SUBSCRIPT = re.compile(r"(?<!\w)([𝒜𝒢io])_([A-Za-z0-9_]+)")
@@ -287,13 +358,6 @@ def _by_claim(rows: Sequence[Row]) -> list[tuple[Row, list[Row]]]:
 def asset(name: str) -> Markup:
     """The text of a file of Avow's own beside the templates."""
     return Markup(resources.files("avow.report").joinpath("templates", name).read_text(encoding="utf-8"))
-
-
-def _reading_order(case: Case) -> Any:
-    nodes = {node.name: at for at, node in enumerate(case.nodes)}
-    kinds = {kind: at for at, kind in enumerate(KINDS)}
-    order = {view.id: at for at, view in enumerate(case.obligations)}
-    return lambda view: (nodes.get(view.obligation.node, len(nodes)), kinds[view.obligation.kind], order[view.id])
 
 
 def _in_full(views: Sequence[ObligationView]) -> set[str]:

@@ -20,6 +20,7 @@ from avow.assurance.naming import cut
 from avow.base.codec import plain
 from avow.base.files import sha256
 from avow.base.plain import count, listed
+from avow.base.remembered import by_identity
 from avow.base.tuning.shown import DETAILS, FORMULA_COLUMNS, HAZARD_CHARACTERS
 from avow.evidence.obligation import SYSTEM_LEVEL, Kind
 from avow.evidence.record import RETRY, Evidence
@@ -155,12 +156,13 @@ def _text(evidence: Evidence, key: str) -> str:
     return ""
 
 
-def of_nodes(views: Iterable[ObligationView]) -> dict[str, list[ObligationView]]:
-    """The claims of each node, in the order given."""
+@by_identity(1)
+def of_nodes(case: Case) -> Mapping[str, tuple[ObligationView, ...]]:
+    """The claims of each node, in the case's order."""
     found: dict[str, list[ObligationView]] = {}
-    for view in views:
+    for view in case.obligations:
         found.setdefault(view.obligation.node, []).append(view)
-    return found
+    return {node: tuple(views) for node, views in found.items()}
 
 
 def where(view: ObligationView) -> str:

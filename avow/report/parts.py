@@ -1,0 +1,106 @@
+"""What a report says about one node, kept from one report to the next.
+
+A part is a text that a pure function makes of its arguments, which are frozen data. Its key is the digest of the
+arguments and of Avow's code, so a part is made again exactly if one of them differs. A part is no evidence: it is in
+the user's cache under the user's seal, one file for each node, and a missing or edited file is made again.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import json
+import pickle
+import shutil
+import sys
+from collections.abc import Callable, Mapping
+from functools import cache
+from operator import attrgetter
+from pathlib import Path
+from typing import Any, ParamSpec
+
+import jinja2
+import yaml
+
+from avow.base.files import PART, sha256, write
+from avow.base.notes import cache_folder, sealed, unsealed
+from avow.base.tuning.sizes import SHELVES
+from avow.evidence.ledger import Entry
+
+P = ParamSpec("P")
+_Kept = dict[str, tuple[str, str]]
+"""Kind of part → its key and its text."""
+
+
+class Parts:
+    """The parts of one report."""
+
+    def __init__(self, folder: Path | None = None, *given: str) -> None:
+        """`folder`: of the report; None: nothing is kept. `given`: what every part depends on."""
+        self._place = cache_folder() / "parts" / sha256(str(folder.absolute())) if folder is not None else None
+        self._given = (sys.version, jinja2.__version__, yaml.__version__, *given)
+        self._kept: dict[str, _Kept] = {}
+        self._used: dict[str, _Kept] = {}
+        self._new: set[str] = set()
+        self._digests: dict[int, tuple[object, str]] = {}
+
+    def text(self, node: str, kind: str, make: Callable[P, str], *args: P.args, **kwargs: P.kwargs) -> str:
+        """What `make` makes of the arguments. It uses nothing else, and `kind` names it."""
+        if self._place is None:
+            return make(*args, **kwargs)
+        key = sha256("".join((*self._given, *map(self._digest, (*args, *kwargs.values())))))
+        if node not in self._kept:
+            data = unsealed(self._file(node))
+            self._kept[node] = pickle.loads(data) if data is not None else {}
+        found = self._kept[node].get(kind, ("", ""))
+        if found[0] != key:
+            found = key, make(*args, **kwargs)
+            self._new.add(node)
+        self._used.setdefault(node, {})[kind] = found
+        return found[1]
+
+    def keep(self) -> None:
+        """Write the files of nodes with a new part, and remove those of nodes that are gone."""
+        if self._place is None:
+            return
+        with contextlib.suppress(OSError):  # with a read-only home everything is made each time
+            for node in self._new:
+                write(self._file(node), sealed(self._file(node), pickle.dumps(self._used[node])))
+            files = {self._file(node) for node in self._used}
+            for path in self._place.iterdir():
+                if path not in files and path.suffix != PART:
+                    path.unlink()
+            reports = sorted(self._place.parent.iterdir(), key=lambda path: path.stat().st_mtime)
+            for place in reports[: -SHELVES or None]:
+                shutil.rmtree(place, ignore_errors=True)
+
+    def _file(self, node: str) -> Path:
+        assert self._place is not None
+        return self._place / sha256(node)
+
+    def _digest(self, value: object) -> str:
+        """Digest of frozen data; computed once for each tuple, which several parts share."""
+        if type(value) is not tuple:
+            return sha256(json.dumps(value, default=_plain))
+        if id(value) not in self._digests:
+            self._digests[id(value)] = value, sha256(json.dumps(value, default=_plain))
+        return self._digests[id(value)][1]
+
+
+def _plain(value: Any) -> object:
+    """The fields of a dataclass. A record's hash covers all of it; a record that does not count has another key
+    (`avow.evidence.currency`)."""
+    if isinstance(value, Entry):
+        return value.hash, value.evidence.key
+    if isinstance(value, Mapping):
+        return dict(value)
+    kind: Any = type(value)
+    return _fields(kind)(value)
+
+
+@cache
+def _fields(kind: type) -> Callable[[Any], object]:
+    return attrgetter(*(field.name for field in dataclasses.fields(kind)))
+
+
+NOTHING_KEPT = Parts()
