@@ -43,18 +43,17 @@ class LintedFile:
 
 def lint(files: Sequence[LintedFile], nodes: Sequence[Node], contract: Contract | None, off: frozenset[str]) -> None:
     """Report every warning about the files, about their sound nodes, and about the contract that the files declare if
-    all of it is sound. They are found node by node (as `of_node` does), since only the first are kept."""
+    all of it is sound."""
     found: list[Diagnostic] = []
-    sound = {node.name: node for node in nodes}
     trees = [(file, tree) for file in files for tree in file.syntax.nodes]
     for file, tree in trees:
-        if contract is not None:
-            found.extend(of_node(file, tree, sound[tree.name.text]))
-            continue
         found.extend(_about_text(file, tree))
-        found.extend(_about_node(sound[tree.name.text]) if tree.name.text in sound else ())
+    for node in nodes:
+        found.extend(_about_node(node))
     if contract is not None:
         found.extend(of_all(contract, files, (spoken(tree) for _, tree in trees)))
+        for file, tree in trees:
+            found.extend(_in_vain(file, tree.definitions, spoken(tree)))
     tell(found, files, off)
 
 
