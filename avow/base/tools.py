@@ -112,6 +112,15 @@ def package_tool(name: str, install: str, line: str) -> Tool:
     return Tool(name, version, None, install, package=name, trial=functools.partial(works, line))
 
 
+PERCEPTION = "pip install 'avow[perception]'"
+
+
+def onnxruntime_tool() -> Tool:
+    """What runs neural networks. Never raises."""
+    line = "import onnxruntime; assert 'CPUExecutionProvider' in onnxruntime.get_available_providers()"
+    return package_tool("onnxruntime", PERCEPTION, line)
+
+
 @functools.cache
 def package_version(name: str) -> str:
     """The version of an installed distribution. Raises `importlib.metadata.PackageNotFoundError`."""

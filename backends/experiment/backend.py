@@ -8,15 +8,18 @@ from pathlib import Path
 
 from avow.backend_kit.given import file_path, summarized
 from avow.backend_kit.one_step import unsaid
-from avow.backend_kit.protocol import Backend, Job, Limits, Opens, Report
+from avow.backend_kit.protocol import Backend, Job, Limits, Opens, Report, Tool
 from avow.base.codec import document
 from avow.base.codes import Catalogue
 from avow.base.diagnostics import Diagnostic, Rejected
+from avow.base.files import inside
+from avow.base.tools import onnxruntime_tool
 from avow.base.verdict import Link, Object, Outcome, Verdict
 from avow.language.contract import Clause, Node
 
 from .campaign import NotMade, drawn, experiment, recorded, regressions
 from .further import contradictions, of_campaign
+from .network import Missing
 from .options import SCHEMA, read
 from .profile import Campaign, command_files, read_campaign, regressions_of
 from .verdict import settle
@@ -27,7 +30,7 @@ class ExperimentBackend(Backend):
 
     name = "experiment"
     title = "recorded runs, judged by the guarantee and exact binomial statistics"
-    version = "11"
+    version = "12"
     strength = Verdict.TESTED
     remembers = True
     chances = True
@@ -64,10 +67,14 @@ class ExperimentBackend(Backend):
             pass
         return ()
 
+    def tools(self) -> tuple[Tool, ...]:
+        return (onnxruntime_tool(),)
+
     def files(self, job: Job) -> tuple[Path, ...]:
-        path = file_path(job, "data")
+        path, network = file_path(job, "data"), job.options.get("network", {})
         if path is None or "campaign" not in job.options:
-            return (path,) if path is not None else ()
+            named = inside(job.root, str(network["file"])) if isinstance(network, dict) and "file" in network else None
+            return tuple(each for each in (path, named) if each is not None)
         recordings = path.with_suffix("")
         made = (p for p in sorted(recordings.rglob("*")) if p.is_file()) if recordings.is_dir() else ()
         return (path, regressions_of(path), *command_files(job), *made)
@@ -94,7 +101,9 @@ class ExperimentBackend(Backend):
     def discharge(self, job: Job, folder: Path, limits: Limits) -> Report:
         try:
             campaign = _campaign(job)
-            found = read(job) if campaign is None else recorded(job, campaign)
+            found = read(job, run=True) if campaign is None else recorded(job, campaign)
+        except Missing as missing:
+            return Report.alike(job, Verdict.NOT_RUN, str(missing), "avow experiment", self.version)
         except NotMade as state:
             verdict, why = state.args
             why = f"{why}: `avow campaign {job.system.name} {job.node.name}` makes the runs"
@@ -110,7 +119,7 @@ class ExperimentBackend(Backend):
             outcome, logs[f"{o.name}.tsv"] = settle(o.name, found, job.kept.get(o.id, ()))
             # the meaning of a part of the contract in terms of columns is a person's judgement
             link = Link.GUIDED if found.claims[o.name].interpreted else self.link
-            of = self.of if campaign is None else Object.MODEL
+            of = self.of if campaign is None and "network" not in job.options else Object.MODEL
             outcomes.append(replace(outcome, obligation=o.id, link=link, of=of))
         beyond = contradictions(job, found) if campaign is None else of_campaign(job, campaign, found)
         return Report(tuple(outcomes), "avow experiment", self.version, logs=logs, contradicted=tuple(beyond))

@@ -22,6 +22,7 @@ from avow.language.sorts import BOOL, REAL, Sort
 
 from .binding import WORDS, Binding, Interpretation, Unfit, bound, interpretation
 from .judging import Claim, Judged, Step, claim
+from .network import with_outputs
 from .table import Row, Table, read_table
 
 SCHEMA = schema(json.loads(read_text(Path(__file__).with_name("options.json"), "utf-8")), "data")
@@ -72,9 +73,9 @@ class Experiment:
         return tuple({b.name: b.value(cells) for b in self.bindings} for cells in rows)
 
 
-def read(job: Job) -> Experiment:
-    """Raises Rejected, with all errors of options and data."""
-    reader = _Reader(job)
+def read(job: Job, run: bool = False) -> Experiment:
+    """Raises Rejected, with all errors of options and data; Missing if a network has to be `run` and cannot be."""
+    reader = _Reader(job, run)
     found = reader.experiment()
     if found is None or reader.found:
         raise Rejected(*reader.found)
@@ -84,7 +85,7 @@ def read(job: Job) -> Experiment:
 def everything(job: Job) -> tuple[tuple[Run, ...], tuple[Interpretation, ...], set[str]]:
     """The runs of a table without errors, with the value of each port that has one in every row; the meanings of
     predicates; and the names of these ports."""
-    reader = _Reader(job)
+    reader = _Reader(job, run=True)
     table = reader._table()
     assert table is not None
     meanings = tuple(reader._meanings(table))
@@ -111,8 +112,9 @@ def limits(job: Job, runs: tuple[Run, ...], claims: Mapping[str, Claim], replaye
 
 
 class _Reader:
-    def __init__(self, job: Job) -> None:
+    def __init__(self, job: Job, run: bool = False) -> None:
         self.job = job
+        self.run = run
         self.options = job.options
         self.found: list[Diagnostic] = []
 
@@ -188,7 +190,8 @@ class _Reader:
     def _table(self) -> Table | None:
         try:
             path = existing_file(self.job, "data", self.options.get("data", ""), wrong="EXP101", absent="EXP102")
-            return read_table(path)
+            table = read_table(path)
+            return with_outputs(self.job, table, self.run) if "network" in self.options else table
         except Rejected as rejected:
             self.found.extend(rejected.diagnostics)
             return None

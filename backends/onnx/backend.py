@@ -7,19 +7,17 @@ from avow.backend_kit.given import file_path, summarized
 from avow.backend_kit.protocol import Backend, Job, Limits, OutsideCheck, Report, Tool
 from avow.base.codes import Catalogue
 from avow.base.diagnostics import Diagnostic, Rejected
-from avow.base.tools import package_tool
+from avow.base.tools import PERCEPTION, onnxruntime_tool, package_tool
 from avow.base.verdict import Link, Object, Verdict
 
 from .options import SCHEMA, read
 from .vnnlib import SCALED, queries
 
-INSTALL = "pip install 'avow[perception]'"
-_TRIALS = {
-    "onnxruntime": "import onnxruntime; assert 'CPUExecutionProvider' in onnxruntime.get_available_providers()",
-    "maraboupy": "from maraboupy import MarabouCore as m; q = m.InputQuery(); q.setNumberOfVariables(1); "
+_MARABOU = (
+    "from maraboupy import MarabouCore as m; q = m.InputQuery(); q.setNumberOfVariables(1); "
     "q.setLowerBound(0, 0); q.setUpperBound(0, 1); e = m.Equation(m.Equation.GE); e.addAddend(1, 0); e.setScalar(2); "
-    "q.addEquation(e); assert m.solve(q, m.Options())[0] == 'unsat'",
-}
+    "q.addEquation(e); assert m.solve(q, m.Options())[0] == 'unsat'"
+)
 
 
 class OnnxBackend(Backend):
@@ -43,7 +41,7 @@ class OnnxBackend(Backend):
     )
 
     def tools(self) -> tuple[Tool, ...]:
-        return tuple(package_tool(name, INSTALL, line) for name, line in _TRIALS.items())
+        return (onnxruntime_tool(), package_tool("maraboupy", PERCEPTION, _MARABOU))
 
     def check(self, job: Job) -> tuple[Diagnostic, ...]:
         try:
@@ -74,7 +72,7 @@ class OnnxBackend(Backend):
         tools = self.tools()
         version = ", ".join(f"{tool.name} {tool.version}" for tool in tools if tool.present) or self.version
         if missing := [tool.name for tool in tools if not tool.present]:
-            why = f"{' and '.join(missing)} missing: {INSTALL}"
+            why = f"{' and '.join(missing)} missing: {PERCEPTION}"
             return Report.alike(job, Verdict.NOT_RUN, why, self.name, version)
         try:
             given = read(job)

@@ -6,12 +6,10 @@ import random
 from collections.abc import Iterator, Sequence
 from fractions import Fraction
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-import onnxruntime
 
-from avow.base.files import read_regular
+from avow.backend_kit.network import Session
 from avow.formulas.values import Binary, Element, Value
 from avow.language.contract import Node
 from avow.language.sorts import TupleSort
@@ -30,20 +28,14 @@ class Runtime:
 
     def __init__(self, path: Path, given: Given) -> None:
         """Raises an exception of onnxruntime if it does not accept the file."""
-        options: Any = onnxruntime.SessionOptions()
-        options.intra_op_num_threads = options.inter_op_num_threads = 1
-        options.log_severity_level = 4
         self._given = given
-        self._session = onnxruntime.InferenceSession(read_regular(path), options, ["CPUExecutionProvider"])
-        self._name = self._session.get_inputs()[0].name
+        self._session = Session(path)
         self.points = 0
         self.difference = 0.0
         """The greatest difference so far between an output and its value from `reading`, computed in float64."""
 
     def outputs(self, point: Point) -> list[float]:
-        tensor = np.array(point, dtype=np.float32).reshape(self._given.network.shape)
-        found: list[float] = self._session.run(None, {self._name: tensor})[0].ravel().tolist()
-        return found
+        return self._session.outputs(point)
 
     def compare(self, point: Point) -> bool:
         """Whether the outputs are about those that `reading` has, computed in float64."""

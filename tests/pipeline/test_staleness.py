@@ -21,7 +21,8 @@ from avow.backend_kit.registry import backend, names
 from avow.base.diagnostics import Rejected
 from avow.calculus.composition import compose
 from avow.calculus.discharge import Bounds
-from avow.calculus.requirements import FormulaQuestion, TemporalQuestion, requirement_question
+from avow.calculus.required import requirement_question
+from avow.calculus.requirements import FormulaQuestion, TemporalQuestion
 from avow.calculus.variables import frame
 from avow.pipeline.evidence_keys import surroundings
 from avow.pipeline.slices import compose_slice, method_slice, sanity_slice
