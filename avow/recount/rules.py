@@ -231,6 +231,12 @@ def _listed(facts: Facts, match: re.Match[str], _block: Block) -> _Numbers:
     return names, str(len(of) - shown) if len(of) > shown else None
 
 
+def _felled(facts: Facts, match: re.Match[str], _block: Block) -> _Numbers:
+    """A claim that is called refuted."""
+    claims = {" ".join(v["obligation"]["claim"].rstrip(".").split()) for v in facts.wrong()}
+    return (match[1] if " ".join(match[1].split()) in claims else "no such refuted claim",)
+
+
 def _days(facts: Facts, match: re.Match[str], _block: Block) -> _Numbers:
     own = facts.owned_ones()
     made, ends = sorted(a.get("date", "") for a in own), sorted(a["until"] for a in own if a["until"])
@@ -362,6 +368,7 @@ RULES = (
     _rule("q2", rf"(\d+) ({_STATUS})\b", _basis),
     _rule("q2", r"and (\d+) nodes? on no less", _whole(lambda f: len(f.case["nodes"]) - 8)),
     _rule("q3", r"and (\d+) more claims?", _whole(lambda f: len(f.wrong()) - min(3, f.wronged()))),
+    _rule("q3", r"(?:Refuted: |; )[^“”]*: “([^”]*\d[^”]*)” \(", _felled),
     _rule("q3", r"On it rests? ([^␟;]*?)(?: and (\d+) more)?(?=\.? $|;)", _listed),
     _rule("q3", r"Requirements (?:refuted|not shown): ([^␟]*?)(?: and (\d+) more)?(?=\. )", _listed),
     _rule("q3", r"; (\d+) other requirements? rests? on this node's other guarantees", _beside),
