@@ -14,7 +14,6 @@ from enum import StrEnum
 
 from avow.assurance.naming import short
 from avow.base.codec import LATER
-from avow.base.plain import count
 from avow.base.records import dataclass
 from avow.system.statements import GENERAL
 
@@ -78,10 +77,10 @@ class Level(StrEnum):
 
 
 MEANINGS = {
-    Level.SHOWN: "everything below is proved, or checked exhaustively, of the program as written or built",
-    Level.MODELS: "something below is of a model, or of the wiring, only; the program may differ",
-    Level.TESTS: "something below is sampled: tests, recordings or measurements",
-    Level.TESTED_MODELS: "something below is sampled, and something of a model only; the program may differ",
+    Level.SHOWN: "all evidence is proof, or exhaustive, of the program as written or built",
+    Level.MODELS: "some evidence is only of a model or the wiring",
+    Level.TESTS: "some evidence is sampled: tests, recordings or measurements",
+    Level.TESTED_MODELS: "some evidence is sampled, some only of a model",
     Level.ARGUED: "a person vouches for the sentence or for a guarantee below",
     Level.NOT_SHOWN: "evidence is missing or stale, it is not validated, or a claim below is not shown or refuted",
     Level.REFUTED: "there is a counterexample",
@@ -217,20 +216,12 @@ class WeakestEvidence:
     bound: str = field(default="", metadata=LATER)
     """For a sample, ``bound 13 %``: its bound on failures, at the confidence that `words` has; or ``no bound``."""
     needed_by: tuple[str, ...] = ()
-    beside: int = field(default=0, metadata=LATER)
-    """The number of requirements whose weakest evidence is in another guarantee of the same node."""
 
     @property
     def brief(self) -> str:
         """``navigation.stays, tested, bound 13 %``."""
         name = short(self.claim).removeprefix("system/requirement/")
         return ", ".join(part for part in (name, self.status, self.bound) if part)
-
-    @property
-    def others(self) -> str:
-        """The text after the requirements that need it: why more of them name the same node."""
-        others = count(self.beside, "other requirement")
-        return f"; {others} rest{'s' * (self.beside == 1)} on this node's other guarantees" if self.beside else ""
 
 
 @dataclass(frozen=True, slots=True)

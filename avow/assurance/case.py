@@ -168,10 +168,8 @@ def conclude(facts: Facts) -> Case:
     following = weakest_of(basis - {weakest.claim}, by_id, relied, titles) if weakest else None
     if weakest is not None:
         needing = tuple(r.id for r in requirements if weakest.claim in r.closure)
-        rest = [r.weakest_evidence for r in requirements if r.id not in needing and r.weakest_evidence]
-        beside = sum(w.node == weakest.node and w.claim != weakest.claim for w in rest)
         dangers = tuple(h.hazard.id for h in hazards if weakest.claim in h.closure)
-        weakest = replace(weakest, needed_by=(*needing, *dangers), beside=beside)
+        weakest = replace(weakest, needed_by=(*needing, *dangers))
     code = exit_code(found)
     told = answers(
         requirements,

@@ -124,7 +124,7 @@ def answers(
     asked = [gate for gate in gates if not gate.idle]
     good = sum(gate.passed for gate in asked)
     relaxed = [gate.title for gate in asked if gate.relaxed]
-    idle = f", {len(relaxed)} relaxed by the plan ({'; '.join(relaxed)})" if relaxed else ""
+    idle = f", {len(relaxed)} relaxed by the plan" if relaxed else ""
     idle += f", {off} do{'es' * (off == 1)} not apply" if (off := len(gates) - len(asked)) else ""
     kinds = len(deficits)
     by_node: dict[str, list[ObligationView]] = {node.name: [] for node in nodes}

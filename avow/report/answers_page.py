@@ -27,8 +27,6 @@ from avow.report.parts import NOTHING_KEPT, Parts
 
 KINDS = 6
 """Kinds of deficit in words on the first screen, the weightiest first: a link counts and explains all."""
-DOUBTS = 1
-"""Doubts about evidence in words on the first screen: those that are open for the most evidence."""
 _ORDER = (Tone.RED, Tone.AMBER, Tone.GREEN, Tone.GREY)
 WORDS = (
     *((level.value, meaning) for level, meaning in MEANINGS.items()),
@@ -56,7 +54,6 @@ def render_answers(case: Case, json_digest: str = "") -> str:
         json_digest,
         brief=wording.gate_line,
         dangers=wording.dangers(case),
-        doubts=[text for text, _, left, _ in sorted(doubts(case), key=lambda doubt: -doubt[2])[:DOUBTS] if left],
         weakest=wording.weakest,
         by_level=by_level,
         content=baseline_of(case).content,

@@ -144,7 +144,7 @@ def _weakest(case: Case) -> str:
     found = case.answers.weakest
     if found is None:
         return "There is no evidence."
-    rests = f" On it rest {listed(found.needed_by)}{found.others}." if found.needed_by else ""
+    rests = f" On it rest {listed(found.needed_by)}." if found.needed_by else ""
     return f"{found.title}: “{found.quote}”. {found.words[:1].upper()}{found.words[1:]}.{rests}"
 
 

@@ -622,7 +622,7 @@ def test_what_was_seen_has_one_wording(verdict: Verdict, method: str, bound: dic
     assert found.answers.next_weakest.endswith(f": {told}")
 
 
-def test_requirements_on_another_guarantee_of_the_weakest_node_are_counted_beside_it() -> None:
+def test_what_rests_on_the_weakest_evidence_and_what_is_the_next() -> None:
     def drawn(bound: float) -> dict[str, object]:
         return {"cases": 20, "failure_probability_below": bound, "confidence": 0.95}
 
@@ -633,10 +633,7 @@ def test_requirements_on_another_guarantee_of_the_weakest_node_are_counted_besid
     whole = case(system({"a": ["g", "h"]}, requirements=asked, hazards=[danger]), node, made)
     found = whole.answers.weakest
     assert found is not None
-    assert (found.needed_by, found.others) == (
-        ("R1", "H"),
-        "; 2 other requirements rest on this node's other guarantees",
-    )
+    assert found.needed_by == ("R1", "H")
     assert whole.answers.next_weakest.startswith("a: “a meets h”: 20 cases")
     proved = case(system({"a": ["g", "h"]}, requirements=asked), node, [made[0], evidence(node[1])])
     assert proved.answers.next_weakest == "", "a proof is not weak"
@@ -655,7 +652,7 @@ def test_requirements_on_another_guarantee_of_the_weakest_node_are_counted_besid
     assert whole.answers.verdict == "Argued (failure rate in use unknown)"
     alone = case(system({"a": ["g"]}, requirements=asked[:1]), node[:1], made[:1]).answers.weakest
     assert alone is not None
-    assert alone.others == ""
+    assert alone.needed_by == ("R1",)
     lost = case(system({"a": ["g", "h"]}, requirements=asked, hazards=[danger]), node, made[1:])
     assert lost.hazards[0].stands == "not shown (weakest: a.g, missing)"
     steps = {gate.id: gate.suggestions[0] for gate in lost.gates if not gate.passed}

@@ -15,7 +15,7 @@ from avow.report.short import LINES, WIDTH, WORDS, comment, terminal_lines
 from avow.report.wording import clean
 from report.chromium import dark, frames_of, measure
 
-OWN_WORDS, ALL_WORDS, BOXES_WITHIN, CONTRAST = 400, 3000, 960, 4.5
+OWN_WORDS, ALL_WORDS, BOXES_WITHIN, CONTRAST = 430, 3000, 960, 4.5
 """Own words above the signature, visible words in all, pixels within which the seven boxes end, least contrast."""
 SHEET = 1010
 """Pixels of a sheet of A4 between its margins: 269 mm, less the rounding of lines."""
