@@ -114,7 +114,7 @@ def write(path: Path, content: str | bytes) -> bool:
     """Replace the file, or anything but a folder, by `content` in one step; returns whether that changed anything.
     Raises OSError."""
     data = content.encode() if isinstance(content, str) else content
-    if path.is_file() and path.read_bytes() == data:
+    if path.is_file() and path.stat().st_size == len(data) and path.read_bytes() == data:
         return False
     path.parent.mkdir(parents=True, exist_ok=True)
     handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=PART)

@@ -95,8 +95,8 @@ def render(state: State, surveyed: Survey) -> Result:
         result = _summarise(state, surveyed, case)
         pages = write_indexes(state.workspace, surveyed.catalogue.works, case)
         listed = state.workspace.artifacts / surveyed.system.name / LISTED
-        made = (*written, *pages, *([listed] if listed.is_file() else []))
-        files = {state.workspace.relative(p): digest_file(p) for p in made}
+        made = {p: digest_file(p) for p in (*pages, *([listed] if listed.is_file() else []))}
+        files = {state.workspace.relative(p): mark for p, mark in (written | made).items()}
         write_note(_stamp(state, surveyed), Rendering(key, files, result))
         state.changed.append(surveyed.system.name)
     confirm(state.workspace, ledger)

@@ -16,7 +16,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
 from avow.assurance.model import Case
-from avow.base.files import sha256, write
+from avow.base.files import digest_once, sha256, write
 from avow.base.workspace import WRITTEN_ON_DEMAND
 from avow.evidence.envelope import seal_lines
 from avow.report import answers_page, exchange, markdown, page, short
@@ -25,22 +25,26 @@ from avow.report.parts import NOTHING_KEPT, Parts
 ATTESTATION = "attestation.jsonl"
 
 
-def render_all(case: Case, folder: Path, key: Path | None = None, parts: Parts = NOTHING_KEPT) -> tuple[Path, ...]:
+def render_all(case: Case, folder: Path, key: Path | None = None, parts: Parts = NOTHING_KEPT) -> dict[Path, str]:
     """Write the formats of one case into `folder`. Files that are written on demand show another state and are removed.
     With a private key the attestations are signed, each in an envelope on a line of its own. Raises OSError, and
-    Rejected for a key that cannot be used."""
-    written = []
-    for name, content in formats(case, parts):
+    Rejected for a key that cannot be used. Returns the digests of the files."""
+    assert parts.folder in (None, folder)
+    written = {}
+    for name, content in _formats(case, parts):
+        if content is None:
+            written[folder / name] = digest_once(folder / name)
+            continue
         if key is not None and name == ATTESTATION:
-            content = seal_lines(content, key)
+            content = seal_lines(content.decode(), key).encode()
         write(folder / name, content)
-        written.append(folder / name)
+        written[folder / name] = sha256(content)
     for name in WRITTEN_ON_DEMAND:
         (folder / name).unlink(missing_ok=True)
     for name in left_over(folder, (path.name for path in written)):
         (folder / name).unlink()
     parts.keep()
-    return tuple(written)
+    return written
 
 
 def left_over(folder: Path, names: Iterable[str]) -> list[str]:
@@ -48,18 +52,26 @@ def left_over(folder: Path, names: Iterable[str]) -> list[str]:
     return sorted({path.name for path in folder.glob("node-*.html")} - set(names))
 
 
-def formats(case: Case, parts: Parts = NOTHING_KEPT) -> Iterator[tuple[str, str]]:
-    """The formats that every run writes, by file name. Same case, same text, whatever parts are kept."""
-    for name, content in _formats(case, parts):
-        yield name, content.encode("utf-8", "replace").decode()  # a tool's text may hold half a character
+def formats(case: Case) -> Iterator[tuple[str, str]]:
+    """The formats that every run writes, by file name. Same case, same text."""
+    for name, content in _formats(case, NOTHING_KEPT):
+        assert content is not None, "nothing is kept"
+        yield name, content.decode()
 
 
-def _formats(case: Case, parts: Parts) -> Iterator[tuple[str, str]]:
+def _formats(case: Case, parts: Parts) -> Iterator[tuple[str, bytes | None]]:
+    """As `formats`, with the texts that are kept; None for a file that is there as it is to be."""
+    for name, content in _texts(case, parts):  # a tool's text may hold half a character
+        yield name, content.encode("utf-8", "replace") if isinstance(content, str) else content
+
+
+def _texts(case: Case, parts: Parts) -> Iterator[tuple[str, str | bytes | None]]:
     as_json = exchange.render_json(case, parts)
+    mark = sha256(as_json)
     yield "report.json", as_json
-    yield "index.html", answers_page.render_answers(case, sha256(as_json))
-    yield "argument.html", answers_page.render_argument(case, sha256(as_json), parts)
-    yield "claims.html", page.render_page(case, sha256(as_json), parts)
+    yield "index.html", answers_page.render_answers(case, mark)
+    yield "argument.html", answers_page.render_argument(case, mark, parts)
+    yield "claims.html", page.render_page(case, mark, parts)
     yield from page.render_details(case, parts)
     yield "report.md", markdown.render_markdown(case)
     yield "comment.md", short.comment(case)

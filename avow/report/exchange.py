@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from itertools import groupby
 from typing import Any
 from urllib.parse import quote
 
@@ -19,23 +21,25 @@ from avow.base.records import dataclass
 from avow.base.rendering import sarif_place
 from avow.evidence.obligation import Kind
 from avow.evidence.status import Status
-from avow.report.layout import Written, json_text
+from avow.report.layout import Written, json_pieces, json_text
 from avow.report.page import fill
 from avow.report.parts import NOTHING_KEPT, Parts
 from avow.report.wording import banner_tone, of_nodes, tone
 
 
-def render_json(case: Case, parts: Parts = NOTHING_KEPT) -> str:
+def render_json(case: Case, parts: Parts = NOTHING_KEPT) -> bytes:
     """The whole case (schema: docs/schemas/case.schema.json)."""
-    whole = to_json(replace(case, obligations=()))
-    lines = {node: iter(parts.text(node, "json", _lines, own).split("\n")) for node, own in of_nodes(case).items()}
-    whole["obligations"] = [Written(next(lines[view.obligation.node])) for view in case.obligations]
-    return json_text(whole)
+    whole, runs = to_json(replace(case, obligations=())), Counter[str]()
+    whole["obligations"] = []
+    for node, views in groupby(case.obligations, key=lambda view: view.obligation.node):
+        runs[node] += 1
+        whole["obligations"].append(Written(parts.text(node, f"json {runs[node]}", _lines, tuple(views))))
+    return b"".join(piece.encode() for piece in (*json_pieces(whole), "\n"))
 
 
 def _lines(views: Sequence[ObligationView]) -> str:
-    """Each view as JSON, on a line of its own."""
-    return "\n".join(json.dumps(codec.to_json(view)) for view in views)
+    """Items of the list of obligations."""
+    return ",\n  ".join(json.dumps(codec.to_json(view)) for view in views)
 
 
 def _result_of(case: Case) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator
 from typing import Any
 
 
@@ -14,15 +15,18 @@ class Written(str):
 
 def json_text(value: Any, depth: int = 2) -> str:
     """JSON with one item a line down to `depth`, and each of these on one line (the C encoder knows no indentation)."""
-    return _json(value, depth, "") + "\n"
+    return "".join(json_pieces(value, depth)) + "\n"
 
 
-def _json(value: Any, depth: int, margin: str) -> str:
-    if depth > 0 and value and isinstance(value, dict):
-        inner = margin + " "
-        rows = (f"{inner}{json.dumps(key)}: {_json(item, depth - 1, inner)}" for key, item in value.items())
-        return "{\n" + ",\n".join(rows) + f"\n{margin}}}"
-    if depth > 0 and value and isinstance(value, list):
-        inner = margin + " "
-        return "[\n" + ",\n".join(inner + _json(item, depth - 1, inner) for item in value) + f"\n{margin}]"
-    return value if type(value) is Written else json.dumps(value)
+def json_pieces(value: Any, depth: int = 2, margin: str = "") -> Iterator[str]:
+    """As `json_text`, piece by piece and without the last line's end."""
+    if depth <= 0 or not value or not isinstance(value, dict | list):
+        yield value if type(value) is Written else json.dumps(value)
+        return
+    begin, end = "{}" if isinstance(value, dict) else "[]"
+    rows = value.items() if isinstance(value, dict) else (("", item) for item in value)
+    for key, item in rows:
+        yield f"{begin}\n{margin} {json.dumps(key)}: " if end == "}" else f"{begin}\n{margin} "
+        yield from json_pieces(item, depth - 1, margin + " ")
+        begin = ","
+    yield f"\n{margin}{end}"

@@ -177,8 +177,9 @@ def _rows(views: Sequence[ObligationView]) -> str:
     return fill("rows.html.j2", views=views, known=pages(views))
 
 
-def render_details(case: Case, parts: Parts = NOTHING_KEPT) -> Iterator[tuple[str, str]]:
-    """Every claim in full, as (file name, page): the whole system with its derivations, each node, the contracts.
+def render_details(case: Case, parts: Parts = NOTHING_KEPT) -> Iterator[tuple[str, str | None]]:
+    """Every claim in full, as (file name, page): the whole system with its derivations, each node, the contracts. None
+    for a page that is there as it is to be (`Parts.file`).
 
     They name neither run nor date: a run that changes nothing of a node leaves its page unchanged.
     """
@@ -207,7 +208,7 @@ def render_details(case: Case, parts: Parts = NOTHING_KEPT) -> Iterator[tuple[st
         if node == SYSTEM_LEVEL:
             yield name, _details(head, title, views, beside, case)
         else:
-            yield name, parts.text(node, "page", _details, head, title, views, beside)
+            yield name, parts.file(node, name, _details, head, title, views, beside)
     if case.sources:
         yield "contracts.html", _fill("contracts.html.j2", case, head=head, title="contracts")
 

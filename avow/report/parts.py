@@ -22,7 +22,8 @@ from typing import Any, ParamSpec
 import jinja2
 import yaml
 
-from avow.base.files import PART, sha256, write
+from avow.assurance.model import ObligationView
+from avow.base.files import PART, is_intact, sha256, write
 from avow.base.notes import cache_folder, sealed, unsealed
 from avow.base.tuning.sizes import SHELVES
 from avow.evidence.ledger import Entry
@@ -37,27 +38,48 @@ class Parts:
 
     def __init__(self, folder: Path | None = None, *given: str) -> None:
         """`folder`: of the report; None: nothing is kept. `given`: what every part depends on."""
+        self.folder = folder
         self._place = cache_folder() / "parts" / sha256(str(folder.absolute())) if folder is not None else None
         self._given = (sys.version, jinja2.__version__, yaml.__version__, *given)
         self._kept: dict[str, _Kept] = {}
         self._used: dict[str, _Kept] = {}
         self._new: set[str] = set()
+        self._encoder = json.JSONEncoder(default=self._plain)
         self._digests: dict[int, tuple[object, str]] = {}
 
     def text(self, node: str, kind: str, make: Callable[P, str], *args: P.args, **kwargs: P.kwargs) -> str:
         """What `make` makes of the arguments. It uses nothing else, and `kind` names it."""
         if self._place is None:
             return make(*args, **kwargs)
+        key, kept = self._known(node, kind, *args, **kwargs)
+        return self._note(node, kind, key, make(*args, **kwargs)) if kept is None else kept
+
+    def file(self, node: str, name: str, make: Callable[P, str], *args: P.args, **kwargs: P.kwargs) -> str | None:
+        """As `text`, the content of a file of the report; None if the file is there as it is to be."""
+        key, kept = self._known(node, name, *args, **kwargs) if self._place is not None else ("", None)
+        if kept is not None and self.folder is not None and is_intact(self.folder / name, kept):
+            return None
+        text = make(*args, **kwargs)
+        if self._place is not None:
+            self._note(node, name, key, sha256(text.encode("utf-8", "replace")))
+        return text
+
+    def _known(self, node: str, kind: str, *args: object, **kwargs: object) -> tuple[str, str | None]:
+        """The key of a part, and its text if it is kept."""
         key = sha256("".join((*self._given, *map(self._digest, (*args, *kwargs.values())))))
         if node not in self._kept:
             data = unsealed(self._file(node))
             self._kept[node] = pickle.loads(data) if data is not None else {}
-        found = self._kept[node].get(kind, ("", ""))
-        if found[0] != key:
-            found = key, make(*args, **kwargs)
-            self._new.add(node)
+        found = self._kept[node].get(kind)
+        if found is None or found[0] != key:
+            return key, None
         self._used.setdefault(node, {})[kind] = found
-        return found[1]
+        return found
+
+    def _note(self, node: str, kind: str, key: str, text: str) -> str:
+        self._used.setdefault(node, {})[kind] = key, text
+        self._new.add(node)
+        return text
 
     def keep(self) -> None:
         """Write the files of nodes with a new part, and remove those of nodes that are gone."""
@@ -79,23 +101,21 @@ class Parts:
         return self._place / sha256(node)
 
     def _digest(self, value: object) -> str:
-        """Digest of frozen data; computed once for each tuple, which several parts share."""
-        if type(value) is not tuple:
-            return sha256(json.dumps(value, default=_plain))
+        return sha256(self._encoder.encode(value))
+
+    def _plain(self, value: Any) -> object:
+        """The fields of a dataclass. A record's hash covers all of it; a record that does not count has another key
+        (`avow.evidence.currency`). Several parts share a view: its digest is computed once."""
+        kind: Any = type(value)
+        if kind is Entry:
+            return value.hash, value.evidence.key
+        if isinstance(value, Mapping):
+            return dict(value)
+        if kind is not ObligationView:
+            return _fields(kind)(value)
         if id(value) not in self._digests:
-            self._digests[id(value)] = value, sha256(json.dumps(value, default=_plain))
+            self._digests[id(value)] = value, self._digest(_fields(kind)(value))
         return self._digests[id(value)][1]
-
-
-def _plain(value: Any) -> object:
-    """The fields of a dataclass. A record's hash covers all of it; a record that does not count has another key
-    (`avow.evidence.currency`)."""
-    if isinstance(value, Entry):
-        return value.hash, value.evidence.key
-    if isinstance(value, Mapping):
-        return dict(value)
-    kind: Any = type(value)
-    return _fields(kind)(value)
 
 
 @cache

@@ -8,7 +8,10 @@ from avow.report.page import render_details, render_page
 
 def claim_pages(found: Case) -> dict[str, str]:
     """File name → page: the overview first."""
-    return {"claims.html": render_page(found), **dict(render_details(found))}
+    return {
+        "claims.html": render_page(found),
+        **{name: text for name, text in render_details(found) if text is not None},
+    }
 
 
 def all_claims(found: Case) -> str:

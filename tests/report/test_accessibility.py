@@ -133,7 +133,7 @@ def pages() -> dict[str, str]:
         "answers": render_answers(rover),
         "argument": render_argument(rover),
         "report": render_page(rover),
-        **dict(render_details(rover)),
+        **{name: text for name, text in render_details(rover) if text is not None},
         "hostile": render_page(hostile),
         "empty": render_page(empty),
         "index": render_index([rover, hostile, empty]),
