@@ -22,7 +22,7 @@ from avow.assurance.naming import short
 from avow.assurance.signed import KEYS, newest_signed
 from avow.backend_kit.registry import backend, names
 from avow.base.diagnostics import Rejected, Span
-from avow.base.files import digest_file, digest_or_missing, is_intact, read_regular, read_text, sha256, write
+from avow.base.files import digest_once, digest_or_missing, is_intact, read_regular, read_text, sha256, write
 from avow.base.git import head
 from avow.base.notes import read_note, write_note
 from avow.base.records import dataclass
@@ -91,11 +91,13 @@ def render(state: State, surveyed: Survey) -> Result:
         case = build(state, surveyed, basis)
         state.cases[surveyed.system.name] = key, case
         place = state.workspace.report(surveyed.system.name)
-        written = render_all(case, place, signing_key(), Parts(None if state.run.fresh else place, report_digest()))
+        parts = Parts(None if state.run.fresh else place, report_digest())
+        written = render_all(case, place, signing_key(), parts)
         result = _summarise(state, surveyed, case)
-        pages = write_indexes(state.workspace, surveyed.catalogue.works, case)
+        pages = write_indexes(state.workspace, surveyed.catalogue.works, case, parts)
+        parts.keep()
         listed = state.workspace.artifacts / surveyed.system.name / LISTED
-        made = {p: digest_file(p) for p in (*pages, *([listed] if listed.is_file() else []))}
+        made = {p: digest_once(p) for p in (*pages, *([listed] if listed.is_file() else []))}
         files = {state.workspace.relative(p): mark for p, mark in (written | made).items()}
         write_note(_stamp(state, surveyed), Rendering(key, files, result))
         state.changed.append(surveyed.system.name)
@@ -255,7 +257,7 @@ def _key(state: State, surveyed: Survey, basis: _Basis) -> str:
     explain = os.environ.get(EXPLAIN, "")
     earlier = zip(ledger.records(), entries, strict=True)
     damage += [f"{old.number} is of an earlier state" for old, now in earlier if old is not now]
-    signed = [digest_file(path) for path in _signatures(state, surveyed)]
+    signed = [digest_once(path) for path in _signatures(state, surveyed)]
     key = signing_key()
     signed += [private_key(key).public_key().public_bytes_raw().hex()] if key is not None else []
     kernel = kernel_run(entries, state.workspace.root, surveyed.system, state.run)
@@ -334,7 +336,7 @@ def edited_pages(workspace: Workspace, surveyed: Survey) -> tuple[Path, ...]:
     known = read_note(Rendering, workspace.artifacts / surveyed.system.name / "report.json")
     files = known.files if known is not None else {}
     made = {workspace.root / name: sha for name, sha in files.items() if Path(name).name in (INDEX, LISTED)}
-    other = (path for path, sha in made.items() if path.is_file() and digest_file(path) != sha)
+    other = (path for path, sha in made.items() if path.is_file() and digest_once(path) != sha)
     current = write_obligations(workspace, surveyed, dry=True)
     return tuple(path for path in other if not (current and path.name == LISTED))
 
@@ -376,7 +378,7 @@ def write_overview(state: State) -> None:
     cases = [case_of(state, s) for s in state.surveyed if workspace.ledger(s.system.name).is_file()]
     if cases or old:
         write_index(cases, workspace.reports, old)
-        page = digest_file(workspace.reports / "index.html")
+        page = digest_once(workspace.reports / "index.html")
         write_note(workspace.artifacts / _OVERVIEW, _Overview(page, old))
 
 

@@ -20,9 +20,11 @@ from avow.evidence.obligation import Kind
 from avow.evidence.status import Status
 from avow.language.contract import Node
 from avow.language.definitions import show_clause
-from avow.pipeline.export import folder, read_stamp
+from avow.pipeline.export import folder, key, read_stamp
 from avow.pipeline.work import Work
+from avow.report.parts import Parts
 from avow.report.short import escaped
+from avow.report.wording import of_nodes
 
 INDEX = "index.md"
 _INTRODUCTION = (
@@ -33,21 +35,24 @@ _INTRODUCTION = (
 _HEAD = ("method", "verdict", "recorded", "file", "outside command", "passes if")
 
 
-def write_indexes(workspace: Workspace, works: Iterable[Work], case: Case) -> tuple[Path, ...]:
+def write_indexes(workspace: Workspace, works: Iterable[Work], case: Case, parts: Parts) -> tuple[Path, ...]:
     """Write the page of each node that has a method; their paths. Raises OSError."""
     methods: dict[str, list[Work]] = {}
     for work in works:
         if not work.is_engine:
             methods.setdefault(work.node, []).append(work)
-    claims: dict[str, list[ObligationView]] = {}
-    for view in case.obligations:
-        if view.obligation.kind is Kind.GUARANTEE:
-            claims.setdefault(view.obligation.node, []).append(view)
     written = []
     for name, of in methods.items():
         path = workspace.artifacts / case.system / name / INDEX
-        node = of[0].system.contract.node(name)
-        write(path, _page(workspace, node, of, claims.get(name, ())))
+        claims = tuple(view for view in of_nodes(case).get(name, ()) if view.obligation.kind is Kind.GUARANTEE)
+        places = [(key(work), folder(workspace, work)) for work in of]
+        made_of = [(asked, place.is_dir(), read_stamp(place)) for asked, place in places]
+
+        def page(claims: Sequence[ObligationView], *_: object, name: str = name, of: Sequence[Work] = of) -> str:
+            return _page(workspace, of[0].system.contract.node(name), of, claims)
+
+        if (text := parts.file(name, str(path), page, claims, made_of)) is not None:
+            write(path, text)
         written.append(path)
     return tuple(written)
 

@@ -43,7 +43,6 @@ def render_all(case: Case, folder: Path, key: Path | None = None, parts: Parts =
         (folder / name).unlink(missing_ok=True)
     for name in left_over(folder, (path.name for path in written)):
         (folder / name).unlink()
-    parts.keep()
     return written
 
 

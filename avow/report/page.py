@@ -210,7 +210,7 @@ def render_details(case: Case, parts: Parts = NOTHING_KEPT) -> Iterator[tuple[st
         else:
             yield name, parts.file(node, name, _details, head, title, views, beside)
     if case.sources:
-        yield "contracts.html", _fill("contracts.html.j2", case, head=head, title="contracts")
+        yield "contracts.html", _fill("contracts.html.j2", case, head=head, title="contracts", parts=parts)
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,9 +18,11 @@ from pygments.token import Comment, Keyword, Name, Number, Operator, String, _To
 from avow.assurance.answers import Tone
 from avow.assurance.model import Case, ObligationView, SourceView
 from avow.base.diagnostics import Span
+from avow.base.files import sha256
 from avow.base.tuning.shown import ANCHORED_LINES, COLOURED_CHARACTERS
 from avow.evidence.obligation import Kind
 from avow.language.pygments_lexer import RclLexer
+from avow.report.parts import NOTHING_KEPT, Parts
 from avow.report.wording import MARKS, anchor, clean, page_of, tone
 
 _COLOURS: tuple[tuple[_TokenType, str], ...] = (
@@ -63,7 +65,7 @@ def location(span: Span | None, known: Mapping[str, tuple[int, int]]) -> Markup:
     return Markup(f'<a href="contracts.html#{_line_anchor(number, span.line)}">{shown}</a>')  # escaped above
 
 
-def lines_of(case: Case, number: int) -> Markup:
+def lines_of(case: Case, number: int, parts: Parts = NOTHING_KEPT) -> Markup:
     """The `number`-th text, line by line; a guarantee's or a requirement's line has its result beside it."""
     source = case.sources[number - 1]
     notes: dict[int, list[str]] = {}
@@ -72,7 +74,7 @@ def lines_of(case: Case, number: int) -> Markup:
         if span.file == source.path:
             needed.add(span.line)
             notes.setdefault(span.line, []).extend([note] if note else [])
-    lines = _coloured(source)
+    lines = _coloured(source, parts)
     rows = []
     for at, shown in enumerate(lines, 1):
         name = f' id="{_line_anchor(number, at)}"' if len(lines) <= ANCHORED_LINES or at in needed else ""
@@ -115,13 +117,22 @@ def _colour(kind: _TokenType) -> str:
     return next((name for found, name in _COLOURS if kind in found), "")
 
 
-def _coloured(source: SourceView) -> list[str]:
-    """The text's lines as HTML."""
+def _coloured(source: SourceView, parts: Parts) -> list[str]:
+    """The text's lines as HTML. A contract without comments of several lines is coloured node by node."""
     if len(source.text) > COLOURED_CHARACTERS:
         return [_shown(line) for line in visible_lines(source.text)]
     text = "\n".join(visible_lines(source.text))
+    pieces = _NODES.split(text) if source.is_contract and "/*" not in text else [text]
+    texts = (parts.text("contracts", sha256(piece), _in_colours, piece, source.is_contract) for piece in pieces)
+    return "\n".join(texts).split("\n")
+
+
+_NODES = re.compile(r"\n(?=node\b)")
+
+
+def _in_colours(text: str, is_contract: bool) -> str:
     lines = [""]
-    for _, kind, value in _lexer(source.is_contract).get_tokens_unprocessed(text):
+    for _, kind, value in _lexer(is_contract).get_tokens_unprocessed(text):
         colour = _colour(kind)
         for at, piece in enumerate(value.split("\n")):
             if at:
@@ -129,7 +140,7 @@ def _coloured(source: SourceView) -> list[str]:
             if piece:
                 shown = _shown(piece)
                 lines[-1] += f'<span class="{colour}">{shown}</span>' if colour else shown
-    return lines
+    return "\n".join(lines)
 
 
 def _shown(piece: str) -> str:

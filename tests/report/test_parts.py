@@ -44,7 +44,9 @@ def test_kept_parts_change_no_byte(tmp_path: Path) -> None:
         some = obligations if step % 5 else obligations[: rng.randrange(1, len(obligations))]
         found = case(subject, some, records, keys=keys, **extras)
         made = {name: text.encode() for name, text in formats(found)}
-        render_all(found, tmp_path / "report", parts=Parts(tmp_path / "report"))
+        parts = Parts(tmp_path / "report")
+        render_all(found, tmp_path / "report", parts=parts)
+        parts.keep()
         files = {path.name: path.read_bytes() for path in (tmp_path / "report").iterdir()}
         assert files == made, step
         for path in (cache_folder() / "parts").rglob("*" if step % 3 == 0 else "none"):
@@ -62,7 +64,9 @@ def test_only_what_depends_on_an_edited_record_is_made_again(tmp_path: Path, mon
 
     def pages(some: list[Evidence]) -> list[str]:
         made.clear()
-        render_all(case(subject, obligations, some, keys=keys, **extras), tmp_path, parts=Parts(tmp_path))
+        parts = Parts(tmp_path)
+        render_all(case(subject, obligations, some, keys=keys, **extras), tmp_path, parts=parts)
+        parts.keep()
         return [title for title in made if title in {o.node for o in obligations}]
 
     assert len(pages(records)) > 1
