@@ -18,7 +18,7 @@ from jinja2.bccache import Bucket, BytecodeCache
 from markupsafe import Markup, escape
 
 from avow.assurance.answers import MEANINGS, Tone
-from avow.assurance.model import Case, Handled, ObligationView, OpenItem
+from avow.assurance.model import Case, DerivationView, Handled, ObligationView, OpenItem
 from avow.assurance.naming import short
 from avow.assurance.remarks import REMARK
 from avow.assurance.traceability import Row
@@ -192,23 +192,19 @@ def render_details(case: Case, parts: Parts = NOTHING_KEPT) -> Iterator[tuple[st
     remarked = _by_item([item for item in case.open_items if item.kind == REMARK])
     told = {name for finding in case.findings for name in finding.obligations}
     for (title, name), (node, views) in zip(links, nodes.items(), strict=False):
+        derived = case.derivations if node == SYSTEM_LEVEL else ()
+        below = {name for d in derived for name in (*d.rests_on, *(c.obligation for c in d.derivation.side_conditions))}
+        named = below.union(*(v.below for v in views), *(d.below for d in derived))
+        texts = (text for v in views for e in v.evidence for text in e.entry.evidence.hypotheses)
         beside = _Beside(
             tuple(view.id for view in views if view.id in full),
-            {
-                text: numbered[text]
-                for v in views
-                for e in v.evidence
-                for text in e.entry.evidence.hypotheses
-                if text in numbered
-            },
+            {text: numbered[text] for text in texts if text in numbered},
             {view.id: remarked[view.id] for view in views if view.id in remarked},
             {view.id: case.said(view.id) for view in views if view.id in told},
-            {name: known[name] for view in views for name in view.below if name in known},
+            {name: known[name] for name in sorted(named) if name in known},
+            {name: case.obligation(name).standing for name in sorted(below) if name in known},
         )
-        if node == SYSTEM_LEVEL:
-            yield name, _details(head, title, views, beside, case)
-        else:
-            yield name, parts.file(node, name, _details, head, title, views, beside)
+        yield name, parts.file(node, name, _details, head, title, views, beside, derived)
     if case.sources:
         yield "contracts.html", _fill("contracts.html.j2", case, head=head, title="contracts", parts=parts)
 
@@ -226,19 +222,24 @@ class _Head:
 
 @dataclass(frozen=True, slots=True)
 class _Beside:
-    """What other parts of the case say about a node's claims."""
+    """What other parts of the case say about a node's claims, or about those that derivations rest on."""
 
     full: tuple[str, ...]
     numbered: Mapping[str, str]
     remarked: Mapping[str, Sequence[OpenItem]]
     said: Mapping[str, Handled | None]
     known: Mapping[str, str]
+    standing: Mapping[str, Status]
 
 
 def _details(
-    head: _Head, title: str, views: Sequence[ObligationView], beside: _Beside, case: Case | None = None
+    head: _Head,
+    title: str,
+    views: Sequence[ObligationView],
+    beside: _Beside,
+    derivations: Sequence[DerivationView],
 ) -> str:
-    """A page of claims in full; with the case, the whole system's."""
+    """A page of claims in full."""
     return fill(
         "details.html.j2",
         head=head,
@@ -247,8 +248,8 @@ def _details(
         beside=beside,
         places=dict(head.places),
         full=frozenset(beside.full),
-        known={**beside.known, **(known_pages(case) if case else pages(views))},
-        case=case,
+        known={**beside.known, **pages(views)},
+        derivations=derivations,
     )
 
 
