@@ -118,9 +118,10 @@ def assumptions(
         *_reaction(facts, closed, statements),
         *_meaning(facts.requirements, statements),
     ]
-    merged: dict[str, list[_Raw]] = {}
-    for item in raw:
-        merged.setdefault(item.statement.says or item.statement.because or item.text, []).append(item)
+    merged: dict[tuple[str, bool], list[_Raw]] = {}
+    for item in raw:  # one whose owner is missing stands apart: it alone lost its owner
+        words = item.statement.says or item.statement.because or item.text
+        merged.setdefault((words, bool(item.statement.who)), []).append(item)
     needed = [
         _one(items, tuple(required), statements)
         for items in merged.values()

@@ -297,6 +297,7 @@ def _edits(old: State, new: State) -> Iterator[tuple[set[str], ChangeLine]]:
             if kind != "equal":
                 last = max(end, start + 1)
                 at = {name for name, s in new.spans.items() if s.file == path and s.line <= last and start < s.end_line}
+                at |= {claim for claim, read in new.reads.items() if path in read}
                 before, after = (_lines(lines) for lines in (was[a:b], now[start:end]))
                 words = f"{path}:{start + 1}: {before} → {after}"
                 yield at, ChangeLine("edit", f"{path}:{start + 1}", words, before, after, about="edit")

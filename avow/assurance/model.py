@@ -345,7 +345,7 @@ class EnvironmentView:
 
 @dataclass(frozen=True, slots=True)
 class SourceView:
-    """A text that the case was made from, unchanged: a contract with its comments, or the plan."""
+    """A text that the case was made from, unchanged: a contract with its comments, the plan, or a parameter file."""
 
     path: str
     """Relative to the workspace; `Case.digests` has the text's SHA-256 under the same name."""

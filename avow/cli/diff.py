@@ -157,6 +157,8 @@ def _of_contracts(contracts: Workspace, place: Workspace) -> dict[str, State]:
     for folder in contracts.systems():
         surveyed = survey(folder)
         if isinstance(surveyed, Rejected):
+            if contracts == place:  # the workspace as it is; an earlier revision may have been unreadable
+                raise surveyed
             found[folder.name] = State()
             continue
         with readable(place.ledger(surveyed.system.name)):

@@ -151,7 +151,9 @@ def build(state: State, surveyed: Survey, basis: _Basis, audited: bool = True) -
     system, workspace, ledger = surveyed.system, state.workspace, basis.ledger
     plan = system.plan
     # read once, so that the texts that the report shows are those whose digests it names
-    files = (*plan.contract_files, plan.path, *plan.included)
+    named = (plan.root / node.source.parameters for node in plan.nodes if node.source and node.source.parameters)
+    parameters = dict.fromkeys(path for path in named if path.is_file())
+    files = (*plan.contract_files, plan.path, *plan.included, *parameters)
     texts = {workspace.relative(path): read_regular(path) for path in files}
     return conclude(
         facts_of_system(

@@ -13,9 +13,18 @@ from avow.assurance.codec import read_case
 FILES = {
     "dodo.py": "",
     "contracts/s/models/n.py": 'def step(x):\n    return {"y": min(x, 1)}\n',
+    "contracts/s/models/k.py": """class K:
+    def __init__(self, given: dict[str, float]) -> None:
+        self.most = given["most"]
+
+    def step(self, z: float) -> dict[str, object]:
+        return {"k": min(z, self.most)}
+""",
+    "contracts/s/k.yaml": "# the limit\nmost: 1.0\n",
     "contracts/s/models/m.py": 'def step(y):\n    return {"z": y}\n',
     "contracts/s/n.rcl": """context { Top = 1; }
 node n { inputs( x : REAL ) outputs( y : REAL ) topics() guarantee g ( out.y <= Top ) }
+node k { inputs( z : REAL ) outputs( k : REAL ) topics() guarantee i ( out.k <= 2 ) }
 node m { inputs( y : REAL ) outputs( z : REAL ) topics() guarantee h ( out.z <= in.y ) }
 """,
     "contracts/s/hazards.yaml": """H1:
@@ -31,11 +40,13 @@ policy:
     medium: {one_of: [tested], cases: 20}
 requirements:
   R: {text: "It is low.", supported_by: [D]}
+  Q: {text: "It is lower.", supported_by: [m.h]}
 compose:
   D: {select: [n, m], persistence: {because: latched}, one_output: {because: it is so}}
 nodes:
   n: {criticality: medium, methods: [{hypothesis: {subject: "models/n.py:step", cases: 40}}]}
   m: {criticality: medium, methods: [{hypothesis: {subject: "models/m.py:step", cases: 40}}]}
+  k: {source: {python: models/k.py, class: K, parameters: k.yaml}, methods: [{hypothesis: {cases: 40}}]}
 """,
 }
 
@@ -46,7 +57,8 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     for name, text in FILES.items():
         (root / name).parent.mkdir(parents=True, exist_ok=True)
         (root / name).write_text(text)
-    avow("validate", "s", "R", "--as", "A. Person", cwd=root)
+    for name in "RQ":
+        avow("validate", "s", name, "--as", "A. Person", cwd=root)
     assert avow("verify", cwd=root).returncode == 0
     done = avow("sign", "--report", "s", "--as", "A. Person", "--until", "2999-01-01", cwd=root)
     assert done.returncode == 0, done.stderr
@@ -70,8 +82,9 @@ EDITS = [
     ("plan.yaml", "[tested]", "[tested, justified]", "≠ policy, guarantees.medium.one_of: also justified", 1),
     ("plan.yaml", "cases: 40}}]}\n  m", "cases: 30}}]}\n  m", "▼ n.g by hypothesis: tested (model), 40 judged", 1),
     ("plan.yaml", "n: {criticality: medium", "n: {criticality: low", "≠ node n, criticality: medium → low", 1),
-    ("plan.yaml", "nodes:", "# why\nnodes:", "≠ contracts/s/plan.yaml:11: (nothing) → # why", 0),
+    ("plan.yaml", "nodes:", "# why\nnodes:", "≠ contracts/s/plan.yaml:12: (nothing) → # why", 0),
     ("models/n.py", "min(x, 1)", "min(1, x)", "≠ contracts/s/models/n.py changed: 1 claim re-run, same verdict", 0),
+    ("k.yaml", "most: 1.0", "most: 1.5", "≠ contracts/s/k.yaml:2: most: 1.0 → most: 1.5", 0),
     ("n.rcl", "Top = 1", "Top = 2", "≠ contracts/s/n.rcl:1: context { Top = 1; } → context { Top = 2; }", 1),
     ("hazards.yaml", "severity: critical", "severity: marginal", "≠ hazard H1, severity: critical → marginal", 1),
     ("hazards.yaml", "[R, n.g]", "[R]", "▼ hazard H1, mitigated by: without n.g", 1),
@@ -93,6 +106,20 @@ def test_an_edit_has_a_line_and_ends_the_signature(
     assert any(line[2:] in entry.words for entry in found.changes.entries)
     assert found.answers.signed.startswith("not signed: A. Person signed another state on ")
     assert found.answers.signed in avow("report", "--check", "s", cwd=signed).stdout
+
+
+def test_a_sentence_that_changed_takes_no_owner_from_another(signed: Path) -> None:
+    edit(signed / "contracts/s/plan.yaml", ("It is lower.", "It is the lowest."))
+    avow("verify", cwd=signed)
+    found = {a.key: a.who for a in read_case(signed / "reports/s").assumptions if a.key.endswith(".validation")}
+    assert found == {"requirements.Q.validation": "", "requirements.R.validation": "A. Person"}
+
+
+def test_a_plan_that_cannot_be_read_is_no_removal(signed: Path) -> None:
+    with (signed / "contracts/s/plan.yaml").open("a") as plan:
+        plan.write("x: [")
+    done = avow("diff", "signed", cwd=signed)
+    assert (done.returncode, done.stdout, "plan.yaml" in done.stderr) == (2, "", True)
 
 
 def test_a_report_is_held_against_the_signature_that_it_names(signed: Path) -> None:
