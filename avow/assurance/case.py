@@ -124,8 +124,8 @@ def conclude(facts: Facts) -> Case:
     rests = {claim.id: claim.rests_on for claim in claims}
     handled = {name: f.how for f in findings if not f.expired for name in f.obligations}
     views = tuple(
-        _obligation(o, facts, evidence[o.id], statuses[o.id], standings[o.id], rests[o.id], handled.get(o.id, ""))
-        for o in facts.obligations
+        _obligation(o, facts, evidence[o.id], statuses[o.id], standings[o.id], claim, handled.get(o.id, ""))
+        for o, claim in zip(facts.obligations, claims, strict=False)  # the first claims are theirs
     )
     said = Statements(facts.statements, facts.today)
     programs = [v for v in views if v.obligation.kind is Kind.PROGRAM]
@@ -141,7 +141,7 @@ def conclude(facts: Facts) -> Case:
         for r in facts.requirements
     )
     levels = {name: r.level for r in requirements for name in r.obligations}
-    views = tuple(replace(view, level=levels.get(view.id)) for view in views)
+    views = tuple(replace(view, level=levels[view.id]) if view.id in levels else view for view in views)
     derived = tuple(_derivation(d, standings, rests, names) for d in facts.derivations)
     fresh, freshness = _fresh(facts, views)
     proofs = proof_views(views, facts.kernel, facts.run.id)
@@ -364,7 +364,7 @@ def _obligation(
     evidence: tuple[EvidenceView, ...],
     status: Status,
     standing: Standing,
-    rests_on: tuple[str, ...],
+    claim: Claim,
     handled: str,
 ) -> ObligationView:
     view = ObligationView(
@@ -374,10 +374,10 @@ def _obligation(
         standing=standing.status,
         evidence=evidence,
         planned=facts.planned.get(obligation.id, ()),
-        rests_on=rests_on,
+        rests_on=claim.rests_on,
         below=standing.below,
         hypotheses=standing.hypotheses,
-        link=_link(tuple(v.entry for v in evidence if v.counts)),
+        link=claim.link,
         handled=handled,
     )
     suggested = suggestion_for(view, facts, facts.today)
