@@ -347,5 +347,7 @@ class Node(Parameters):
         if name in ("_avow", "_avow_declared"):
             raise RuntimeError(f"{type(self).__name__} is used before its __init__ calls super().__init__(name)")
         if name.startswith(OF_NODES) or name in ("context", "handle"):
-            raise self._avow.refuse(f"rclpy.node.Node.{name}")
+            begun = name[: -(-3 * len(name) // 4)]  # `create_subscriber` begins as `create_subscription` does
+            near = "".join(f" (did you mean `{known}`?)" for known in dir(type(self)) if known.startswith(begun))
+            raise self._avow.refuse(f"rclpy.node.Node.{name}{near}")
         raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")

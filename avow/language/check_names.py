@@ -8,7 +8,7 @@ from fractions import Fraction
 
 from avow.base.diagnostics import Span
 from avow.base.plain import count
-from avow.base.suggestions import did_you_mean
+from avow.base.suggestions import did_you_mean, suggest
 from avow.language.conversions import convert
 from avow.language.foreign import APART, FIELDS, WORDS
 from avow.language.lexer import KEYWORDS, Token, unquote
@@ -252,7 +252,7 @@ class Names(ABC):
             if p.name == name and p.role in roles and p.role in scope.roles
         ]
         if not ports:
-            near = did_you_mean(name, (p.name for p in (*node.inputs, *node.outputs)))
+            near = suggest(name, (p.name for p in (*node.inputs, *node.outputs)))
             self.error("RCL203", f"node `{node_name}` has no input or output `{name}`", tree, hint=near)
             return None
         if len(ports) > 1:

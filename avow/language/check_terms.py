@@ -343,6 +343,8 @@ class Terms(Names):
                 return f"apply `{self.text(tree)}` to its {count(len(one.sort.parameters), 'argument')} first"
             if isinstance(one.sort, s.EnumSort) and other.sort in (s.BOOL, s.STRING, s.NATURAL):
                 return f"the values of {one.sort.name} are {', '.join(one.sort.members[:6])}"
+            if one.sort == s.BOOL and other.sort == s.NATURAL and isinstance(one, t.Variable):
+                return f"write `{self.text(tree)}`, or `not {self.text(tree)}`"
         return None
 
     def membership(

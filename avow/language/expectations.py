@@ -65,6 +65,11 @@ def explain(
         message = f"{_expected(start, expected)} is missing after `{last.text[:40]}`"
         reports.error("RCL120", message, last.start, last.end, hint=hint)
         return
+    if start in ("ports", "given") and found.type == "COLON" and at > 2 and tokens[at - 2].end < tokens[at - 1].start:
+        before, name = tokens[at - 2], tokens[at - 1]
+        message = f"a `,` is missing after `{before.text[:40]}`, before the port `{name.text[:40]}`"
+        reports.error("RCL120", message, before.start, before.end)
+        return
     message = f"expected {_expected(start, expected)} and not `{found.text[:40]}`"
     if found.type == "RPAR" and start == "formula" and "$END" in expected:
         message = "this `)` closes nothing"

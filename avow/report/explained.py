@@ -37,7 +37,8 @@ def explained(case: Case, name: str) -> Iterator[Explanation]:
         found += _of_code(name)
     if _MARK.match(name) and not found and all(view.id != name for view in case.obligations):
         found += [_of_record(entry) for entry in _entries(case) if entry.hash.startswith(name)]
-        if not found and (places := list(islice(_places(to_json(case), name), RECORDS))):
+        claimed = any(short(view.id) == name for view in case.obligations)
+        if not found and not claimed and (places := list(islice(_places(to_json(case), name), RECORDS))):
             found.append((f"{name} in report.json", places))
         if sha256(render_json(case)) == name:
             found.append(("report.json", ["the digest of this report's data, from which every format is rendered"]))

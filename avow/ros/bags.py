@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -219,6 +219,13 @@ def _opened(path: Path, origin: Origin) -> Iterator[Any]:
         yield reader
 
 
+def _metadata(path: Path) -> str:
+    """A bag's metadata.yaml; empty if there is none."""
+    with suppress(OSError):
+        return read_text(path / "metadata.yaml", "utf-8", errors="replace")
+    return ""
+
+
 @contextmanager
 def _readable(path: Path) -> Iterator[None]:
     from rosbags.highlevel import AnyReaderError
@@ -233,6 +240,8 @@ def _readable(path: Path) -> Iterator[None]:
             hint = "the bag holds no definitions: name the distribution, `ros: {distro: humble}`, and `messages:`"
         if "magic" in why or "malformed" in why:
             hint = "it was cut off: `mcap recover` or `ros2 bag reindex` restores the messages that are whole"
+            if "storage_identifier: mcap" in _metadata(path) and (stored := sorted(path.glob("*.db3"))):
+                hint = f"metadata.yaml says mcap, and {stored[0].name} is sqlite3: correct its storage_identifier"
         if path.is_dir() and not (path / "metadata.yaml").exists():
             why, hint = (
                 "its folder has no metadata.yaml",

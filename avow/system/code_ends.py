@@ -103,6 +103,7 @@ def _against_contract(node: Node, placed: Placed, code: Code) -> Iterator[Diagno
     plumbing = [name for name, _ in ends if is_plumbing(name) or name.startswith("/tf")]
     strange = {n: end for n, end in ends if (n, end.side in _TOPICS) not in known and n not in plumbing}
     calls: set[str] = set()
+    blamed: set[tuple[str, str]] = set()
     for topic, name, kind, plain in topics:
         if not plain and name in calls:
             continue  # the request of a call whose response was examined
@@ -110,10 +111,16 @@ def _against_contract(node: Node, placed: Placed, code: Code) -> Iterator[Diagno
         if is_plumbing(name) or kind.partition("/")[0] in OWN_CALLS:
             continue
         mine = [end for whole, end in ends if whole == name and (end.side in _TOPICS) is plain]
-        yield from _wrong_type(topic, name, kind, mine)
+        for found, fault in _wrong_type(topic, name, kind, mine):
+            if found not in blamed:  # a package's wrong name is one fault, however many topics have its types
+                yield fault
+            blamed.add(found)
         sides = _SIDES if topic.port is None or not plain else {topic.port.role: _SIDES[topic.port.role]}
         if not code.unread and not any(not plain or end.side in sides.values() for end in mine):
             does = _DOES["".join(sides.values())] if len(sides) == 1 else "creates"
+            if (name, does) in blamed:
+                continue  # it carries several ports
+            blamed.add((name, does))
             near = nearest(name, strange)
             if not near and topic.port is not None:  # the one end of this side and type that the contract lacks
                 alike = [n for n, end in strange.items() if end.side == sides[topic.port.role] and end.kind == kind]
@@ -132,12 +139,20 @@ def _against_contract(node: Node, placed: Placed, code: Code) -> Iterator[Diagno
         yield Diagnostic("ROS132", text, end.span, Severity.WARNING, hint, here)
 
 
-def _wrong_type(topic: Topic, name: str, kind: str, mine: Sequence[Created]) -> Iterator[Diagnostic]:
+def _wrong_type(
+    topic: Topic, name: str, kind: str, mine: Sequence[Created]
+) -> Iterator[tuple[tuple[str, str], Diagnostic]]:
+    """The fault with the names that differ: of the packages, if the types have one name in both."""
     for end in mine:
         if end.kind and end.kind != kind and "/_action/" not in topic.name:
+            ours, theirs = kind.partition("/"), end.kind.partition("/")
+            apart = (ours[0], theirs[0]) if ours[2] == theirs[2] else (name, end.kind)
             text = f"{name} is {kind} in the contract, and {end.kind} in the code"
             hint = "correct one of them"
-            yield Diagnostic("ROS133", text, topic.span, hint=hint, notes=(("it is created here", end.span),))
+            if apart == (ours[0], theirs[0]):
+                hint = f"correct the import of {theirs[0]} in the code, or the package in the contract"
+            notes = (("it is created here", end.span),)
+            yield apart, Diagnostic("ROS133", text, topic.span, hint=hint, notes=notes)
             return
 
 

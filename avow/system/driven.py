@@ -49,6 +49,9 @@ def misused(plan: Plan) -> Iterator[Diagnostic]:
             for name, hint in unbound(tree):
                 if name.id in remedied:
                     continue
+                packages = sorted(kind.partition("/")[0] for kind in messages() if kind.endswith(f"/{name.id}"))
+                if packages:
+                    hint = f"write `from {packages[0]}.msg import {name.id}`"
                 message = f"`{name.id}` is not defined: the file neither imports nor assigns it"
                 yield Diagnostic("DRIVE106", message, _span(name, str(path)), Severity.WARNING, hint)
 

@@ -21,6 +21,7 @@ from avow.base.suggestions import nearest
 from avow.language.contract import Node, Port
 from avow.language.sorts import INTEGER, NATURAL, Sort
 from avow.language.units import unit
+from avow.ros.names import Resolver
 from avow.system.plan import Edge, Endpoint, System
 from avow.system.topics import Carrier, Ends, contradicted, ends, unheard, unlinked, wrong_types
 
@@ -92,7 +93,7 @@ def dataflow(system: System) -> Graph:
     taken = {edge.target: edge for edge in edges}
     edges += _by_topics(nodes, taken, found, faults)
     taken = {edge.target: edge for edge in edges}
-    edges += _by_names(nodes, taken, found, faults)
+    edges += _by_names(nodes, taken, found, faults, system.plan.ros.names)
     for edge in edges:
         if edge.target.node not in relays:
             faults += unheard(edge.source, edge.target, found, edge.span)
@@ -255,9 +256,10 @@ def _which(target: Endpoint, others: Sequence[tuple[Endpoint, Port]], carrier: C
 
 
 def _by_names(
-    nodes: Sequence[Node], taken: Mapping[Endpoint, Edge], found: Ends, faults: list[Diagnostic]
+    nodes: Sequence[Node], taken: Mapping[Endpoint, Edge], found: Ends, faults: list[Diagnostic], names: Resolver
 ) -> list[Edge]:
     outputs: dict[str, list[tuple[str, Port]]] = defaultdict(list)
+    blamed: set[tuple[str, ...]] = set()
     relays = {node.name for node in nodes if node.relay}
     for node in nodes:
         for port in () if node.relay else node.outputs:
@@ -281,8 +283,10 @@ def _by_names(
                 others = [(name, o) for name, o in others if Endpoint(name, o.name) not in found.outputs]
                 if apart and not others:
                     other = found.outputs[apart[0]][0]
-                    if apart[0] not in dict(found.reaching(target)):
-                        faults.append(unlinked(target, carrier, apart[0], other, port.span))
+                    pair = (apart[0].node, other.topic, target.node, carrier.topic)
+                    if apart[0] not in dict(found.reaching(target)) and pair not in blamed:
+                        blamed.add(pair)  # one fault, however many ports the topics carry
+                        faults.append(unlinked(target, carrier, apart[0], other, port.span, names))
                     continue
             fitting = [(name, output) for name, output in others if fits(output.sort, port.sort)]
             if len(fitting) == 1:

@@ -16,7 +16,7 @@ from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.base.files import read_regular
 from avow.base.packaged import packaged
 from avow.base.plain import bare
-from avow.base.suggestions import suggest
+from avow.base.suggestions import nearest, suggest
 from avow.language.contract import Node
 from avow.system.plan import Hazard, Plan
 from avow.system.schema import violations
@@ -70,7 +70,7 @@ def _table(data: bytes, file: str) -> tuple[Piece, tuple[Diagnostic, ...]]:
     try:
         rows = [(line, row) for line, row in csv_rows(data) if any(row)]
     except ValueError as error:
-        raise Rejected(Diagnostic("PLAN109", f"not a CSV file in UTF-8: {error}", Span(file, 1, 1, 1, 2))) from None
+        raise Rejected(Diagnostic("PLAN109", f"not a CSV file: {error}", Span(file, 1, 1, 1, 2))) from None
     if not rows:
         raise Rejected(Diagnostic("PLAN109", "the table is empty", Span(file, 1, 1, 1, 2)))
     (line, header), *entries = rows
@@ -82,9 +82,17 @@ def _table(data: bytes, file: str) -> tuple[Piece, tuple[Diagnostic, ...]]:
         hint = "; ".join(f"{field}: {', '.join(COLUMNS[field])}" for field in missing)
         raise Rejected(Diagnostic("PLAN109", message, Span(file, line, 1, line, 2), hint=hint))
     hazards, spans, faults = dict[str, Piece](), dict[str, Span](), list[Diagnostic]()
+    lost = [field for field in COLUMNS if field not in at]
+    for word in (word for word in header if bare(word) not in fields):
+        if near := nearest(bare(word), (bare(name) for field in lost for name in COLUMNS[field])):
+            message = f"the column {word!r} is not read: did you mean {near[0]!r}?"
+            faults.append(Diagnostic("PLAN109", message, Span(file, line, 1, line, 2)))
     whole = Span(file, 1, 1, line, 2)
     for line, row in entries:
         span = Span(file, line, 1, line, 2)
+        if len(row) > len(header):
+            message = f"{len(row)} cells, but {len(header)} columns"
+            faults.append(Diagnostic("PLAN109", message, span, hint="put a text that has a comma in quotes"))
         cells = {field: row[place] for field, place in at.items() if place < len(row) and row[place]}
         name = cells.pop("id", "")
         if name in spans:
@@ -97,6 +105,8 @@ def _table(data: bytes, file: str) -> tuple[Piece, tuple[Diagnostic, ...]]:
             parts[field] = Piece(span, items=words) if field in _LISTS else Piece(span, plain, plain)
         spans[name] = span
         hazards[name] = Piece(span, entries=parts)
+    if any(len(row) > len(header) for _, row in entries):  # what its cells mean is not known
+        raise Rejected(*faults)
     return Piece(whole, entries=hazards, keys=spans), tuple(faults)
 
 

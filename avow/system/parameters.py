@@ -87,7 +87,8 @@ def _node(plan: Plan, node: Node, faults: list[Diagnostic]) -> tuple[Node, Mappi
     for name in entry.parameters.data if entry.source is None else ():
         if name not in known:
             message = f"nodes.{node.name}.parameters: {node.name} has no parameter {name!r}"
-            faults.append(Diagnostic("PLAN106", message, entry.parameters.at(name), hint=suggest(name, known)))
+            hint = suggest(name, known) or f"declare it under the node's `inputs`: `parameter {name} : REAL`"
+            faults.append(Diagnostic("PLAN106", message, entry.parameters.at(name), hint=hint))
     fixed: list[Port] = []
     run_with: dict[str, Any] = {}
     places: dict[str, Span | None] = {}

@@ -190,6 +190,8 @@ def _explain(error: Any, root: Piece, whole: str, also: Iterable[Any] = ()) -> I
                 hint = "write true or false (yes, no, on and off are plain words here)"
             elif isinstance(error.instance, int | float | bool) and "string" in kinds and "pattern" not in error.schema:
                 hint = "put it in quotes"
+            elif kinds == ["object"] and isinstance(error.instance, str) and (keys := error.schema.get("required")):
+                hint = f"write `{{{', '.join(f'{key}: …' for key in keys)}}}`"
             if "pattern" in error.schema and about:
                 yield fault(f"{about} is wanted, not {given}")
                 return

@@ -62,7 +62,11 @@ def other_separator(header: Sequence[str]) -> str:
 
 def csv_rows(data: bytes) -> list[tuple[int, tuple[str, ...]]]:
     """The rows of a CSV file that are not empty, each with the line on which it ends. Raises ValueError."""
-    text = data.decode("utf-8-sig").replace("\r\n", "\n").replace("\r", "\n")
+    try:
+        text = data.decode("utf-8-sig").replace("\r\n", "\n").replace("\r", "\n")
+    except UnicodeDecodeError as error:
+        line = data.count(b"\n", 0, error.start) + 1
+        raise ValueError(f"line {line} has a character that is not UTF-8: save the file as UTF-8") from None
     reader = csv.reader(io.StringIO(text, newline=""), strict=True)
     try:
         rows = [(reader.line_num, tuple(cell.strip() for cell in row)) for row in reader if row]

@@ -215,13 +215,26 @@ def _remap_hint(node: str, carrier: Carrier, meant: Carrier) -> str:
     return f"{f'{near} ' if near else ''}if they are one topic when the robot runs:  {remap}"
 
 
-def unlinked(target: Endpoint, carrier: Carrier, source: Endpoint, other: Carrier, span: Span | None) -> Diagnostic:
+def unlinked(
+    target: Endpoint,
+    carrier: Carrier,
+    source: Endpoint,
+    other: Carrier,
+    span: Span | None,
+    names: Resolver,
+) -> Diagnostic:
     """Ports of one name on different topics."""
     message = (
         f"{source} does not feed {target}: it is published on {other.topic}, and {target.node} listens to "
         f"{carrier.topic}; the input is left to the environment"
     )
-    return Diagnostic("ROS113", message, span, Severity.WARNING, _remap_hint(target.node, carrier, other))
+    hint, notes = _remap_hint(target.node, carrier, other), []
+    for name, placed in ((name, names.placed(name)) for name in (source.node, target.node)):
+        if placed.launched and placed.remaps:
+            hint = "correct the launch file, or the topic in the contract"
+            remaps = ", ".join(f"{old} to {new}" for old, new in placed.remaps)
+            notes.append((f"{name} is started with {remaps} remapped here", placed.span))
+    return Diagnostic("ROS113", message, span, Severity.WARNING, hint, tuple(notes))
 
 
 # -- several publishers ------------------------------------------------------------------------------------------------

@@ -188,7 +188,8 @@ def _first(done: Completed, reading: Reading, folder: Path) -> str:
         missing += (
             f"{reading.adapter.name} has no `void step(const avow::Inputs&, avow::Outputs&)` that can be called: "
         )
-    return (missing + plainly(text, reading, folder))[:300]
+    absent = "; name the folder that holds it under `include`" if text.endswith("file not found") else ""
+    return (missing + plainly(text, reading, folder))[:300] + absent
 
 
 def plainly(text: str, reading: Reading, folder: Path) -> str:

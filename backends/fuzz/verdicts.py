@@ -13,7 +13,7 @@ from avow.backend_kit.linked import Recorded, settled
 from avow.backend_kit.programs.judging import Formula, NoValue, Seen, exact, returned, seen, started, triggers
 from avow.backend_kit.programs.samples import as_single, next_single
 from avow.base.files import read_text
-from avow.base.suggestions import did_you_mean
+from avow.base.suggestions import nearest, suggest
 from avow.base.verdict import Counterexample, Hypothesis, HypothesisKind, Outcome, Verdict
 from avow.drive.steps import coded, plain
 from avow.evaluation.truth import as_shown
@@ -236,11 +236,13 @@ class Bench:
         name = found[1] if (found := re.search("`([^`]*)`", message)) else ""
         ports = (*reading.node.inputs, *reading.node.outputs)
         names = {*known} or {*reading.params, *(port.name for port in ports)}
-        hint = did_you_mean(name, names) if name and name not in names else None
+        hint = suggest(name, sorted(names)) if name and name not in names else None
         lines = read_text(reading.adapter, errors="replace").splitlines()
         line = next((f":{at}" for at, text in enumerate(lines, 1) if f'"{name}"' in text), "")
         why = message.removeprefix("the adapter: ")
         place = f"{reading.source.cpp}{line}"
+        if near := [each for each in nearest(name, reading.params) if hint and f"`{each}`" in hint]:
+            return Misused(f"{place} asks for the parameter `{name}`, and {reading.source.parameters} sets `{near[0]}`")
         return Misused(f"{place}: the adapter does not fit the contract: {why}{f': {hint}' if hint else ''}")
 
     def _allowed(self, case: Mapping[str, Any]) -> bool | None:

@@ -334,7 +334,7 @@ def _print_summary(running: Session, further: int) -> None:
     if not any(True for _ in running.clauses()):
         summary.append("nothing was judged: write what a node promises in place of `to_write`")
     elif not _anything_judged(running):
-        why = "no clause ever had a value for all that it speaks of" if running.events else "the recording is empty"
+        why = "no clause ever had a value for all that it speaks of" if running.events else "no event came"
         summary.append(f"nothing was judged: {why}")
     fine = "nothing broken in what was decided" if unmonitored else "nothing broken"
     click.echo(f"{running.events} events: {', '.join(summary) or fine}")

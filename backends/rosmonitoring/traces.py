@@ -116,7 +116,8 @@ def event_of(line: str, name: str, number: int, services: Services) -> Event | N
     try:
         event = services.part(parse_event(line))
     except json.JSONDecodeError as error:
-        raise Rejected(_fault(name, number, error.colno, f"this is not JSON: {error.msg}")) from None
+        why = "one event a line, without [ ]" if line.lstrip().startswith("[") else error.msg
+        raise Rejected(_fault(name, number, error.colno, f"this is not JSON: {why}")) from None
     except ValueError as error:
         raise Rejected(_fault(name, number, 1, str(error))) from None
     topic = event.get("topic")

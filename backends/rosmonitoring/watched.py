@@ -172,7 +172,7 @@ def remedies(tally: Tally, silent: Mapping[str, str], unread: Mapping[str, str])
         (late, f"{late} had no value when answers came (a latched topic, or a late publisher): {said}"),
         (tally.order and tally.unpaired, "pair answers with inputs by a stamp or a key (`answers`)"),
         (tally.reason == DEPENDS, "pair answers by a stamp or a key, or measure a shorter latency (`answers`)"),
-        (LEAST_SHARE <= share < 1 and tally.triggered and not wrong, f"accept a smaller share, decided: {share:g}"),
+        (LEAST_SHARE <= share < 1 and tally.triggered and not unread, f"accept a smaller share, decided: {share:g}"),
     )
     return "; or ".join(words for applies, words in parts if applies)
 

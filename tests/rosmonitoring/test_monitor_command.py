@@ -119,7 +119,7 @@ def test_a_trace_of_other_topics_is_no_success(case_folder: Path, traces: dict[s
     done = monitor(str(case_folder), "-", stdin=text)
     assert done.returncode == 1
     assert "nothing was judged: no clause" in done.stdout
-    assert "the recording is empty" in monitor(str(case_folder), "-", stdin="").stdout
+    assert "no event came" in monitor(str(case_folder), "-", stdin="").stdout
 
 
 @pytest.mark.slow

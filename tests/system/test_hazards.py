@@ -67,6 +67,8 @@ def test_a_file_in_yaml_and_a_table_of_an_stpa(tmp_path: Path) -> None:
         ("h.csv", CSV.replace("Marginal", "awful"), "PLAN105", 2, "is not one of catastrophic"),
         ("h.csv", CSV + "U1,again,critical,,\n", "PLAN110", 3, "declared twice"),
         ("h.csv", "", "PLAN109", 1, "empty"),
+        ("h.csv", CSV.replace("drives off", "drives, off"), "PLAN109", 2, "6 cells, but 5 columns"),
+        ("h.csv", CSV.replace("Mitigated by", "Mitigatedby"), "PLAN109", 1, "not read: did you mean 'mitigated_by'?"),
         ("h.csv", CSV.replace(",", ";"), "PLAN109", 1, "';' separates its columns: separate them by commas"),
     ],
 )

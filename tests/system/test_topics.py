@@ -96,6 +96,12 @@ def test_a_remapping_the_other_way_round(tmp_path: Path) -> None:
         (SOURCE + sink(topic="u"), "connections: [{from: a.x, to: b.y}]", ["ROS112"]),
         (SOURCE + sink(topic="u"), "connections: [{from: a.x, to: b.y}]\nros: {nodes: {b: {remap: {u: t}}}}", []),
         (SOURCE + sink(topic="u", port="x"), "{}", ["ROS113"]),
+        (
+            node("a", "", "x : REAL, z : REAL", "p/P t matches(out.x), p/P t matches(out.z)")
+            + node("b", "x : REAL, z : REAL", "", "p/P u matches(in.x), p/P u matches(in.z)"),
+            "{}",
+            ["ROS113"],  # once, though two ports are apart
+        ),
         (SOURCE + sink(topic="u", port="x"), "ros: {nodes: {b: {remap: {u: t}}}}", []),
         (SOURCE + sink(sort="BOOL"), "{}", ["PLAN121"]),
         (
