@@ -220,13 +220,14 @@ def _basis(
 ) -> tuple[NodeBasis, tuple[int, float]]:
     """A node's line, and how weak it is: its worst colour, then the share with that colour. `views`: the node's."""
     own = [v for v in views if v.obligation.kind is Kind.GUARANTEE]
+    others = [v for v in views if v.obligation.kind is not Kind.GUARANTEE and v.status in _WRONG and not v.advice]
     marks = [(_mark(view, relied), view) for view in own]
     by_object: dict[str, Counter[str]] = {}
     for (said, _), view in marks:
         by_object.setdefault(_examined(view, relied, views), Counter())[said] += 1
     counted = {what: ", ".join(f"{many} {said}" for said, many in of.items()) for what, of in by_object.items()}
     words = "; ".join(" ".join((many, what)).strip() for what, many in counted.items()) or "no guarantees"
-    wrong = {v.obligation.kind is Kind.PROGRAM for v in views if v not in own and v.status in _WRONG and not v.advice}
+    wrong = {v.obligation.kind is Kind.PROGRAM for v in others}
     words += "".join(f"; a check of its {'program' if program else 'contract'} fails" for program in sorted(wrong))
     squares = tuple((LETTERS.get(said, "✘"), tone) for (said, tone), _ in marks)
     worst = min((tone.rank for _, tone in squares), default=Tone.GREEN.rank)

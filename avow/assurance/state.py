@@ -63,8 +63,7 @@ def state_of(case: Case) -> State:
     spans = {v.id: v.obligation.span for v in views if v.obligation.kind is Kind.GUARANTEE}
     spans |= {r.id: r.span for r in case.requirements}
     return State(
-        {subject: {name: value for name, value in values.items() if any(value)} for subject, values in _items(case)},
-        {source.path: source.text for source in case.sources},
+        *_compared(case),
         None,
         frozenset(("gate", g.title) for g in case.gates if _unanswered(g, case)),
         {view.id: view.obligation.claim for view in views},
@@ -106,11 +105,9 @@ def state_of_ledger(entries: Iterable[Entry]) -> State:
 
 def baseline_of(case: Case, name: str = "", who: str = "", signed_on: str = "", until: str = "") -> Baseline:
     """The part of a case that is signed, and compared with later cases."""
-    state = state_of(case)
-    items = (
-        (about, subject, name, value) for (about, subject), of in state.items.items() for name, value in of.items()
-    )
-    found = Baseline(name, who, signed_on, until, "", case.answers.verdict, tuple(items), tuple(state.sources.items()))
+    subjects, sources = _compared(case)
+    items = ((about, subject, name, value) for (about, subject), of in subjects.items() for name, value in of.items())
+    found = Baseline(name, who, signed_on, until, "", case.answers.verdict, tuple(items), tuple(sources.items()))
     return replace(found, content=content_of(found))
 
 
@@ -118,6 +115,12 @@ def content_of(of: Baseline) -> str:
     """SHA-256 of everything that a signature covers."""
     items = sorted([about, subject, name, *value] for about, subject, name, value in of.items if name not in OF_RECORDS)
     return sha256(canonical([of.verdict, items, sorted(map(list, of.sources))]))
+
+
+def _compared(case: Case) -> tuple[Items, Mapping[str, str]]:
+    """The items, without empty values, and the texts of contracts and plan."""
+    items = {at: {name: value for name, value in values.items() if any(value)} for at, values in _items(case)}
+    return items, {source.path: source.text for source in case.sources}
 
 
 def _items(case: Case) -> Iterator[tuple[tuple[str, str], Mapping[str, Value]]]:
