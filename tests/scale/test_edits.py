@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import random
 import re
 import shutil
 import subprocess
@@ -10,8 +11,10 @@ import sys
 from pathlib import Path
 
 import pytest
+from helpers import edit
 
 from avow.evidence.ledger import Ledger
+from avow.pipeline.report_check import check
 
 from .made import programs
 
@@ -55,6 +58,39 @@ def test_one_edited_clause_is_one_export_one_sanity_and_one_method(place: Path) 
     contract.write_text("// a comment, which moves every line\n\n" + contract.read_text())
     assert stages(doit(place, "verify")) == []
     assert "nothing to do" in doit(place, "verify")
+
+
+def test_what_is_kept_of_a_report_changes_no_byte(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """After each edit every file is what a render without a cache makes of the case; some files name no run."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    place = tmp_path / "workspace"
+    programs(place / "contracts" / "made", 3, 3)
+    shutil.copy(ROOT / "dodo.py", place)
+    contract, plan = (place / "contracts" / "made" / name for name in ("system.rcl", "plan.yaml"))
+    report, rng = place / "reports" / "made", random.Random(29)
+    edits = {
+        contract: [
+            ("in.x1 > 1 ->", "in.x1 > 2 ->"),
+            ("node n2", "// moved\nnode n2"),
+            ("in.x0 > 0 ->", "in.x0 > -1 ->"),
+        ],
+        plan: [("n0: {criticality: high", "n0: {criticality: low"), ("system: made", "title: Another\nsystem: made")],
+    }
+    for path, old, new in rng.sample([(path, *pair) for path, pairs in edits.items() for pair in pairs], 5):
+        edit(path, (old, new))
+        doit(place, "verify")
+        assert check(report, Ledger(place / "artifacts" / "ledger" / "made.jsonl"), place) == ()
+        pages = [*report.glob("node-*.html"), report / "system.html", report / "contracts.html"]
+        pages += (place / "artifacts" / "made").glob("*/index.md")
+        kept = {page: page.read_bytes() for page in pages}
+        shutil.rmtree(tmp_path / "avow" / "parts")
+        shutil.rmtree(report)
+        for page in (place / "artifacts" / "made").glob("*/index.md"):
+            page.unlink()
+        doit(place, "report")
+        assert kept == {page: page.read_bytes() for page in pages}, new
+        if rng.random() < 0.5:
+            shutil.rmtree(tmp_path / "avow")
 
 
 def test_always_is_fresh(place: Path) -> None:
