@@ -96,11 +96,13 @@ def verification(folder: Path, nodes: int = 50) -> None:
 
 
 def floor(place: Path) -> dict[str, Cost | None]:
-    """What every run that changes something costs: the imports, and the report on the whole system."""
-    shutil.rmtree(place / "reports" / "made")
+    """What every run that changes something costs: the imports, the ledger's lines, and a report of unchanged nodes."""
+    (place / "artifacts" / "made" / "report.json").unlink()
     modules = "avow.cli, avow.pipeline.stages, avow.pipeline.summary, lark, z3"
+    parse = f"import json; [*map(json.loads, open({str(place / 'artifacts' / 'ledger' / 'made.jsonl')!r}))]"
     return {
         "import of what it runs": cost([sys.executable, "-c", f"import {modules}"], ROOT, HERE),
+        "the ledger, parsed as JSON": cost([sys.executable, "-c", parse], ROOT),
         "avow report, which runs no tool": avow(place, "report", "made"),
     }
 

@@ -44,14 +44,14 @@ def write_indexes(workspace: Workspace, works: Iterable[Work], case: Case, parts
     written = []
     for name, of in methods.items():
         path = workspace.artifacts / case.system / name / INDEX
-        claims = tuple(view for view in of_nodes(case).get(name, ()) if view.obligation.kind is Kind.GUARANTEE)
         places = [(key(work), folder(workspace, work)) for work in of]
         made_of = [(asked, place.is_dir(), read_stamp(place)) for asked, place in places]
 
-        def page(claims: Sequence[ObligationView], *_: object, name: str = name, of: Sequence[Work] = of) -> str:
+        def page(views: Sequence[ObligationView], *_: object, name: str = name, of: Sequence[Work] = of) -> str:
+            claims = [view for view in views if view.obligation.kind is Kind.GUARANTEE]
             return _page(workspace, of[0].system.contract.node(name), of, claims)
 
-        if (text := parts.file(name, str(path), page, claims, made_of)) is not None:
+        if (text := parts.file(name, str(path), page, of_nodes(case).get(name, ()), made_of)) is not None:
             write(path, text)
         written.append(path)
     return tuple(written)

@@ -17,6 +17,7 @@ from avow.assurance.relied import kept_apart, shade
 from avow.assurance.state import baseline_of
 from avow.base.plain import count, listed
 from avow.base.tuning.shown import NODE_BOXES, SHEET_LETTERS
+from avow.evidence.obligation import Kind
 from avow.evidence.record import Evidence
 from avow.evidence.status import Status, weigh
 from avow.report import wording
@@ -24,6 +25,7 @@ from avow.report.goals import doubts
 from avow.report.modules import RequirementModule, conditions, node_modules, requirement_modules
 from avow.report.page import fill, known_pages, pages
 from avow.report.parts import NOTHING_KEPT, Parts
+from avow.report.wording import of_nodes
 
 KINDS = 6
 """Kinds of deficit in words on the first screen, the weightiest first: a link counts and explains all."""
@@ -74,7 +76,7 @@ def render_argument(case: Case, json_digest: str = "", parts: Parts = NOTHING_KE
     for node, guarantees in ((module.node, module.guarantees) for module in node_modules(case)):
         basis = bases.get(node.name) or basis_of(node, case)
         said = {view.id: told.reason for view in guarantees if (told := case.said(view.id)) and told.reason}
-        nodes.append(parts.text(node.name, "argument", _node, node, guarantees, basis, said))
+        nodes.append(parts.text(node.name, "argument", _node, node, of_nodes(case).get(node.name, ()), basis, said))
     return _render(
         "argument.html.j2",
         case,
@@ -140,7 +142,8 @@ def _requirement(case: Case, module: RequirementModule) -> dict[str, Any]:
     return {**fields, "own": own}
 
 
-def _node(node: NodeView, guarantees: Sequence[ObligationView], basis: NodeBasis, said: Mapping[str, str]) -> str:
+def _node(node: NodeView, views: Sequence[ObligationView], basis: NodeBasis, said: Mapping[str, str]) -> str:
+    guarantees = [view for view in views if view.obligation.kind is Kind.GUARANTEE]
     return fill(
         "argument_node.html.j2",
         node=node,

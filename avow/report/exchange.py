@@ -24,22 +24,25 @@ from avow.evidence.status import Status
 from avow.report.layout import Written, json_pieces, json_text
 from avow.report.page import fill
 from avow.report.parts import NOTHING_KEPT, Parts
-from avow.report.wording import banner_tone, of_nodes, tone
+from avow.report.wording import banner_tone, of_nodes, proof_runs, tone
 
 
 def render_json(case: Case, parts: Parts = NOTHING_KEPT) -> bytes:
     """The whole case (schema: docs/schemas/case.schema.json)."""
-    whole, runs = to_json(replace(case, obligations=())), Counter[str]()
+    whole, begun = to_json(replace(case, obligations=(), proofs=())), Counter[str]()
+    whole["proofs"] = [Written(parts.text(node, f"json {n}", _lines, run)) for node, n, run in proof_runs(case)]
     whole["obligations"] = []
-    for node, views in groupby(case.obligations, key=lambda view: view.obligation.node):
-        runs[node] += 1
-        whole["obligations"].append(Written(parts.text(node, f"json {runs[node]}", _lines, tuple(views))))
+    for node, run in groupby(case.obligations, key=lambda view: view.obligation.node):
+        begin, end = begun[node], begun[node] + len(list(run))
+        text = parts.text(node, f"json {begin}", _lines, of_nodes(case)[node], begin, end)
+        whole["obligations"].append(Written(text))
+        begun[node] = end
     return b"".join(piece.encode() for piece in (*json_pieces(whole), "\n"))
 
 
-def _lines(views: Sequence[ObligationView]) -> str:
-    """Items of the list of obligations."""
-    return ",\n  ".join(json.dumps(codec.to_json(view)) for view in views)
+def _lines(items: Sequence[object], begin: int = 0, end: int | None = None) -> str:
+    """Items of a list, as `json_pieces` has them."""
+    return ",\n  ".join(json.dumps(codec.to_json(item)) for item in items[begin:end])
 
 
 def _result_of(case: Case) -> str:

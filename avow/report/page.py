@@ -18,6 +18,7 @@ from jinja2.bccache import Bucket, BytecodeCache
 from markupsafe import Markup, escape
 
 from avow.assurance.answers import MEANINGS, Tone
+from avow.assurance.certification import ProofView
 from avow.assurance.model import Case, DerivationView, Handled, ObligationView, OpenItem
 from avow.assurance.naming import short
 from avow.assurance.remarks import REMARK
@@ -34,7 +35,7 @@ from avow.evidence.record import IN_PART
 from avow.evidence.status import Status, weigh
 from avow.report import example, source, wording
 from avow.report.parts import NOTHING_KEPT, Parts
-from avow.report.wording import history
+from avow.report.wording import history, of_nodes, proof_runs
 
 KINDS = (Kind.GUARANTEE, Kind.SANITY, Kind.COMPOSITION, Kind.REQUIREMENT, Kind.PROGRAM, Kind.WELL_FORMED)
 _KIND = {kind: at for at, kind in enumerate(KINDS)}
@@ -139,11 +140,11 @@ def fill(template: str, **given: Any) -> str:
 def render_page(case: Case, json_digest: str = "", parts: Parts = NOTHING_KEPT) -> str:
     """The overview of every claim. Deterministic: same case, same bytes. `json_digest` is the digest of the report.json
     beside it: with it no edit of that file goes unnoticed, not even of a part that no other format shows."""
-    matrix = _matrix(case)
     listed = [item for item in case.open_items if not item.advice]
-    nodes = by_node(case)
+    nodes, standings = by_node(case), {view.standing for view in case.obligations}
+    found = {view.obligation.kind for view in case.obligations}
     groups = [
-        (node, _stands(views), Markup(parts.text(node, "claims", _rows, views)))  # a template's own text
+        (node, _stands(views), Markup(parts.text(node, "claims", _rows, of_nodes(case)[node])))  # a template's own text
         for node, views in nodes.items()
     ]
     return _fill(
@@ -153,7 +154,7 @@ def render_page(case: Case, json_digest: str = "", parts: Parts = NOTHING_KEPT) 
         total=len(case.obligations),
         counts=_counts(case.obligations),
         partly={(r.obligation, r.method) for v in case.guarantees for r in v.records if r.bound.get(IN_PART)},
-        matrix=matrix if len(case.guarantees) <= GUARANTEE_ROWS else [],
+        matrix=_matrix(case) if len(case.guarantees) <= GUARANTEE_ROWS else [],
         graph=_svg_image(case.graph_svg),
         open_items=listed,
         open_line=wording.open_line(case),
@@ -165,16 +166,21 @@ def render_page(case: Case, json_digest: str = "", parts: Parts = NOTHING_KEPT) 
         remarks=[item for item in case.open_items if item.kind == REMARK],
         justified=_justified(case),
         used_methods=_used_methods(case),
-        statuses=[s for s in Status if any(view.standing is s for view in case.obligations)],
+        statuses=[s for s in Status if s in standings],
         json_digest=json_digest,
-        kinds=[kind for kind in KINDS if any(view.obligation.kind is kind for view in case.obligations)],
+        kinds=[kind for kind in KINDS if kind in found],
         open_at_once=ROWS_UNFOLDED,
+        proofs=Markup("".join(parts.text(node, n, _proofs, run) for node, n, run in proof_runs(case))),  # as above
     )
+
+
+def _proofs(proofs: Sequence[ProofView]) -> str:
+    return fill("proofs.html.j2", proofs=proofs)
 
 
 def _rows(views: Sequence[ObligationView]) -> str:
     """A line for each claim of a node."""
-    return fill("rows.html.j2", views=views, known=pages(views))
+    return fill("rows.html.j2", views=_in_order(views), known=pages(views))
 
 
 def render_details(case: Case, parts: Parts = NOTHING_KEPT) -> Iterator[tuple[str, str | None]]:
@@ -191,7 +197,8 @@ def render_details(case: Case, parts: Parts = NOTHING_KEPT) -> Iterator[tuple[st
     numbered, known = wording.numbered(case), known_pages(case)
     remarked = _by_item([item for item in case.open_items if item.kind == REMARK])
     told = {name for finding in case.findings for name in finding.obligations}
-    for (title, name), (node, views) in zip(links, nodes.items(), strict=False):
+    for (title, name), node in zip(links, nodes, strict=False):
+        views = of_nodes(case).get(node, ())
         derived = case.derivations if node == SYSTEM_LEVEL else ()
         below = {name for d in derived for name in (*d.rests_on, *(c.obligation for c in d.derivation.side_conditions))}
         named = below.union(*(v.below for v in views), *(d.below for d in derived))
@@ -244,7 +251,7 @@ def _details(
         "details.html.j2",
         head=head,
         title=title,
-        views=views,
+        views=_in_order(views),
         beside=beside,
         places=dict(head.places),
         full=frozenset(beside.full),
@@ -271,8 +278,12 @@ def pages(views: Iterable[ObligationView]) -> dict[str, str]:
 def by_node(case: Case) -> Mapping[str, tuple[ObligationView, ...]]:
     """Every obligation, in reading order: the nodes in the contract's order, then the whole system."""
     place = {node.name: at for at, node in enumerate(case.nodes)}
-    nodes = sorted(wording.of_nodes(case).items(), key=lambda found: place.get(found[0], len(place)))
-    return {node: tuple(sorted(views, key=lambda v: _KIND[v.obligation.kind])) for node, views in nodes}
+    nodes = sorted(of_nodes(case).items(), key=lambda found: place.get(found[0], len(place)))
+    return {node: _in_order(views) for node, views in nodes}
+
+
+def _in_order(views: Iterable[ObligationView]) -> tuple[ObligationView, ...]:
+    return tuple(sorted(views, key=lambda v: _KIND[v.obligation.kind]))
 
 
 _SUBSCRIPT = re.compile(r"(?<!\w)([𝒜𝒢io])_([A-Za-z0-9_]+)")

@@ -22,7 +22,6 @@ from typing import Any, ParamSpec
 import jinja2
 import yaml
 
-from avow.assurance.model import ObligationView
 from avow.base.files import PART, is_intact, sha256, write
 from avow.base.notes import cache_folder, sealed, unsealed
 from avow.base.tuning.sizes import SHELVES
@@ -44,7 +43,6 @@ class Parts:
         self._kept: dict[str, _Kept] = {}
         self._used: dict[str, _Kept] = {}
         self._new: set[str] = set()
-        self._encoder = json.JSONEncoder(default=self._plain)
         self._digests: dict[int, tuple[object, str]] = {}
 
     def text(self, node: str, kind: str, make: Callable[P, str], *args: P.args, **kwargs: P.kwargs) -> str:
@@ -101,21 +99,21 @@ class Parts:
         return self._place / sha256(node)
 
     def _digest(self, value: object) -> str:
-        return sha256(self._encoder.encode(value))
-
-    def _plain(self, value: Any) -> object:
-        """The fields of a dataclass. A record's hash covers all of it; a record that does not count has another key
-        (`avow.evidence.currency`). Several parts share a view: its digest is computed once."""
-        kind: Any = type(value)
-        if kind is Entry:
-            return value.hash, value.evidence.key
-        if isinstance(value, Mapping):
-            return dict(value)
-        if kind is not ObligationView:
-            return _fields(kind)(value)
+        """Digest of frozen data. A node's views (`wording.of_nodes`) are an argument of several parts."""
+        if type(value) is not tuple:
+            return sha256(json.dumps(value, default=_plain))
         if id(value) not in self._digests:
-            self._digests[id(value)] = value, self._digest(_fields(kind)(value))
+            self._digests[id(value)] = value, sha256(json.dumps(value, default=_plain))
         return self._digests[id(value)][1]
+
+
+def _plain(value: Any) -> object:
+    """The fields of a dataclass. A record's hash covers all of it; a record that does not count has another key
+    (`avow.evidence.currency`)."""
+    kind: Any = type(value)
+    if kind is Entry:
+        return value.hash, value.evidence.key
+    return dict(value) if isinstance(value, Mapping) else _fields(kind)(value)
 
 
 @cache

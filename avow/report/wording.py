@@ -6,7 +6,8 @@ import functools
 import re
 import shlex
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from itertools import groupby
 from typing import Any
 from urllib.parse import quote
 
@@ -14,6 +15,7 @@ import yaml
 
 from avow.assurance import naming
 from avow.assurance.answers import Deficit, Level, Tone
+from avow.assurance.certification import ProofView
 from avow.assurance.hazards import WORST_FIRST
 from avow.assurance.model import Case, EvidenceView, ObligationView, RequirementView
 from avow.assurance.naming import cut
@@ -163,6 +165,14 @@ def of_nodes(case: Case) -> Mapping[str, tuple[ObligationView, ...]]:
     for view in case.obligations:
         found.setdefault(view.obligation.node, []).append(view)
     return {node: tuple(views) for node, views in found.items()}
+
+
+def proof_runs(case: Case) -> Iterator[tuple[str, str, tuple[ProofView, ...]]]:
+    """Consecutive proofs about one node: the node, the run's name among the node's parts, and the proofs."""
+    begun = Counter[str]()
+    for node, run in groupby(case.proofs, key=lambda proof: proof.obligation.partition("/")[2].partition("/")[0]):
+        begun[node] += 1
+        yield node, f"proofs {begun[node]}", tuple(run)
 
 
 def where(view: ObligationView) -> str:
