@@ -98,6 +98,8 @@ def exact(text: str) -> Fraction:
     for a number that has more digits, written out, than one in a contract may have."""
     from fractions import Fraction
 
+    if not text.isascii() or "_" in text:  # Python's own `int` and `Fraction` accept these
+        raise ValueError(text)
     if len(text) > DIGITS or abs(int(text.lower().partition("e")[2] or 0)) > DIGITS:
         raise ValueError(text)
     try:

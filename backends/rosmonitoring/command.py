@@ -321,7 +321,7 @@ def _print_summary(running: Session, further: int) -> None:
     if running.withheld:
         click.echo(f"withheld: {', '.join(f'{topic} {count}' for topic, count in running.withheld.items())}")
     if unmonitored := running.unmonitored():
-        click.echo(f"unmonitored, since too little was decided: {', '.join(unmonitored)}")
+        click.echo(f"unmonitored: {', '.join(unmonitored)}")
         for name, remedy in unmonitored.items():
             if remedy:
                 click.echo(f"  {name}: {remedy}")

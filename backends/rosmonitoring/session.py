@@ -29,7 +29,7 @@ from .observing import NAME, method_of
 from .options import Setup, known_types, origin, same_topic, setup
 from .rules import NOTHING_KNOWN
 from .traces import Services, opened, transforms
-from .watched import Fault, Tally, Violation, remedies
+from .watched import Fault, Tally, Violation, remedies, too_old
 
 RAW = "_mon"
 """The suffix of a filtered topic's name under which its node publishes."""
@@ -198,15 +198,19 @@ class Session:
         _report_withheld(self.monitors, self.behind_filters)
 
     def unmonitored(self) -> dict[str, str]:
-        """The clauses of monitored nodes for which too few publications were decided, each with a proposal for the
-        plan, or the reason."""
-        return {
-            f"{monitor.setup.node.name}.{name}": remedies(tally, monitor.silent, monitor.unread) or tally.reason
-            for monitor, name, kind, tally in self.clauses()
-            if monitor.setup.node.name in self.asked
-            and not tally.hidden
-            and (not tally.decided or monitor.backwards or tally.decided < monitor.setup.decided * _asked(kind, tally))
-        }
+        """The clauses of monitored nodes for which too few publications were decided, or whose inputs were too old,
+        each with a proposal for the plan, or the reason."""
+        found = {}
+        for monitor, name, kind, tally in self.clauses():
+            if monitor.setup.node.name not in self.asked or tally.hidden:
+                continue
+            few = tally.decided < monitor.setup.decided * _asked(kind, tally)
+            if aged := too_old(tally.ages, monitor.setup.max_age):
+                found[f"{monitor.setup.node.name}.{name}"] = aged
+            elif not tally.decided or monitor.backwards or few:
+                why = remedies(tally, monitor.silent, monitor.unread) or tally.reason
+                found[f"{monitor.setup.node.name}.{name}"] = why
+        return found
 
     @property
     def topics(self) -> tuple[str, ...]:

@@ -13,7 +13,7 @@ from .engine import Monitor
 from .lanes import Marks, Signals
 from .options import same_topic
 from .tuning import VIOLATIONS_KEPT
-from .watched import Fault, Violation, coverage, old, remedies, silent_topic
+from .watched import Fault, Violation, coverage, old, remedies, silent_topic, too_old
 
 
 class Run:
@@ -174,11 +174,8 @@ def _lost(s: Shown) -> Answer | None:
 
 
 def _aged(s: Shown) -> Answer | None:
-    limit = s.setup.max_age
-    aged = next((of for of, age in s.ages.items() if limit is not None and age > limit), None)
-    if aged is None:
-        return None
-    return Answer(Verdict.UNKNOWN, f"{aged} was {s.ages[aged]:.6g} s old when an answer came: too old (`max_age`)")
+    aged = too_old(s.ages, s.setup.max_age)
+    return Answer(Verdict.UNKNOWN, aged) if aged else None
 
 
 def _never(s: Shown) -> Answer | None:

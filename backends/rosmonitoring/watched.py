@@ -177,6 +177,12 @@ def remedies(tally: Tally, silent: Mapping[str, str], unread: Mapping[str, str])
     return "; or ".join(words for applies, words in parts if applies)
 
 
+def too_old(ages: Mapping[str, float], limit: Fraction | None) -> str:
+    """Which input was older than the plan's `max_age` when an answer came; empty if none was."""
+    aged = next((of for of, age in ages.items() if limit is not None and age > limit), None)
+    return f"{aged} was {ages[aged]:.6g} s old when an answer came: too old (`max_age`)" if aged is not None else ""
+
+
 def old(ages: Mapping[str, float]) -> str:
     """``inputs at most 0.12 s old (in.r), 3.1 s (in.at)``."""
     shown = [f"{age:.3g} s{' old' if k == 0 else ''} ({name})" for k, (name, age) in enumerate(ages.items())]

@@ -169,3 +169,16 @@ def test_the_oracle_over_a_websocket(case: System, nominal: list[dict[str, Any]]
     finally:
         started[0].shutdown()
         thread.join(20)
+
+
+def test_inputs_that_are_too_old_are_no_success(tmp_path: Path) -> None:
+    (tmp_path / "system.rcl").write_text(
+        "node n { inputs( x : REAL ) outputs( y : BOOL ) topics( std_msgs/Float64 x matches(in.x), std_msgs/Bool y "
+        "matches(out.y) ) guarantee g ( in.x > 5 -> out.y ) }"
+    )
+    method = "rosmonitoring: {answers: {by: arrival, because: b}, max_age: 500 ms}"
+    (tmp_path / "plan.yaml").write_text(f"ros: {{distro: humble}}\nnodes: {{n: {{methods: [{method}]}}}}\n")
+    for late, code in ((5.0, 1), (0.4, 0)):
+        events = [{"topic": "x", "time": 1.0, "data": 9.0}, {"topic": "y", "time": 1.0 + late, "data": True}]
+        done = monitor(str(tmp_path), "-", stdin="".join(f"{json.dumps(event)}\n" for event in events))
+        assert (done.returncode, "too old (`max_age`)" in done.stdout) == (code, code == 1), done.stdout
