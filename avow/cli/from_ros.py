@@ -40,6 +40,7 @@ def draft_system(bag: Path | None, graph: str | None, distro: str | None, folder
         raise Rejected(*wrong)
     base = known
     listing = _listing(graph) if graph is not None else None
+    qos = listing.qos if listing is not None else ""
     origins: list[str] = []
     given = Given(folder.name, "", listing or Listing(()), known, frozenset(KEYWORDS), distro=distro)
     if bag is not None:
@@ -78,7 +79,7 @@ def draft_system(bag: Path | None, graph: str | None, distro: str | None, folder
     if bag is not None:
         given = replace(given, messages=_own_types(listing, known, base))
     graph_file = "models/rosgraph.txt" if graph is not None else None
-    given = replace(given, listing=listing, origin=" and ".join(origins), graph=graph_file)
+    given = replace(given, listing=replace(listing, qos=qos), origin=" and ".join(origins), graph=graph_file)
     made = draft(given)
     write(folder / "system.rcl", format_text(made.contract, str(folder / "system.rcl")))
     write(folder / "plan.yaml", made.plan)
@@ -87,6 +88,8 @@ def draft_system(bag: Path | None, graph: str | None, distro: str | None, folder
         write(folder / "msg" / package / "msg" / f"{kind}.msg", text)
     if graph is not None:
         write(folder / "models/rosgraph.txt", listing.text())
+    if qos:
+        write(folder / "models/qos.txt", qos)
     if bag is not None:
         write(folder / "traces/.gitignore", f"# large, and named in plan.yaml with its digest\n/{bag.name}\n")
         (shutil.copytree if bag.is_dir() else shutil.copyfile)(bag, folder / "traces" / bag.name)

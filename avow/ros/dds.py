@@ -11,12 +11,14 @@ import os
 import re
 import struct
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from types import MappingProxyType
 from typing import Any
 from xml.sax.saxutils import quoteattr
 
 from avow.base.tuning.running import DDS_NAMES, DDS_PAUSE, DDS_SECONDS, LAST_DOMAIN
 from avow.ros.listing import Listed, Listing, NoListing
+from avow.ros.names import is_name
 
 LOOPBACK = ("127.0.0.1", "localhost")
 
@@ -93,15 +95,19 @@ def ask_domain(domain: int, host: str = LOOPBACK[0], seconds: float = DDS_SECOND
         del entity
     except DDSException as error:
         raise NoListing(f"DDS domain {domain} cannot be joined at {host}: {error}") from None
-    return listing_of([(e.key.bytes, e.participant_key.bytes, e.topic_name, e.type_name, w) for e, w in ends], names)
+    found = [(e.key.bytes, e.participant_key.bytes, e.topic_name, e.type_name, w) for e, w in ends]
+    return listing_of(found, names, {e.key.bytes: e.qos for e, _ in ends})
 
 
 End = tuple[bytes, bytes, str, str, bool]
 """An endpoint: its name, its participant's, its topic, its type, whether it writes."""
 
 
-def listing_of(ends: list[End], names: Mapping[bytes, str]) -> Listing:
-    """The ROS graph of these endpoints; `names`: endpoint → its node."""
+def listing_of(
+    ends: list[End], names: Mapping[bytes, str], policies: Mapping[bytes, Iterable[Any]] = MappingProxyType({})
+) -> Listing:
+    """The ROS graph of these endpoints; `names`: endpoint → its node; `policies`: endpoint → its quality of service."""
+    printed: dict[str, None] = {}
     nodes: dict[str, dict[str, dict[str, None]]] = {}
     types: dict[str, str] = {}
     strangers: dict[bytes, str] = {}
@@ -113,9 +119,32 @@ def listing_of(ends: list[End], names: Mapping[bytes, str]) -> Listing:
         side, name = part
         node = names.get(key) or strangers.setdefault(participant, f"/participant_{len(strangers) + 1}")
         nodes.setdefault(node, {}).setdefault(side, {})[name] = None
+        if side in _ENDPOINTS and key in policies and is_name(name) and is_name(node):
+            printed[_printed(node, name, side, policies[key])] = None
         types[name] = f"{said[1]}/{said[3] if said[2] == 'msg' else _PART.sub('', said[3])}"
     listed = {name: {side: tuple(found) for side, found in sides.items()} for name, sides in sorted(nodes.items())}
-    return Listing(tuple(Listed(name, **sides) for name, sides in listed.items()), types)
+    return Listing(tuple(Listed(name, **sides) for name, sides in listed.items()), types, "".join(printed))
+
+
+_ENDPOINTS = {"publishes": "PUBLISHER", "subscribes": "SUBSCRIPTION"}
+
+
+def _printed(node: str, topic: str, side: str, policies: Iterable[Any]) -> str:
+    """An endpoint as ``ros2 topic info --verbose`` prints it, below its topic. Discovery does not give the depth."""
+    space, _, name = node.rpartition("/")
+    lines = [topic, f"Node name: {name}", f"Node namespace: {space or '/'}"]
+    lines += [f"Endpoint type: {_ENDPOINTS[side]}", "QoS profile:"]
+    for policy in policies:
+        kind = re.sub(r"(?<=[a-z])(?=[A-Z])", "_", type(policy).__qualname__.rpartition(".")[2]).upper()
+        match policy.__scope__:
+            case "Reliability" | "Durability":
+                lines.append(f"  {policy.__scope__}: {kind}")
+            case "Deadline":
+                lines.append(f"  Deadline: {policy.deadline} nanoseconds")
+            case "Liveliness":
+                lines.append(f"  Liveliness: {kind.replace('PARTICIPANT', 'NODE')}")
+                lines.append(f"  Liveliness lease duration: {policy.lease_duration} nanoseconds")
+    return "\n".join([*lines, "", ""])
 
 
 def _side(topic: str, writes: bool) -> tuple[str, str] | None:

@@ -304,6 +304,7 @@ class _Draft:
             "",
             "ros:",
             *([f"  distro: {given.distro}"] if given.distro else []),
+            *(["  qos: models/qos.txt"] if given.listing.qos else []),
             "  nodes:",
             *(f"    {name}: {{name: {json.dumps(node.name)}}}" for name, node in nodes.items()),
         ]

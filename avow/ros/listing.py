@@ -35,10 +35,12 @@ class Listed:
 
 @dataclass(frozen=True, slots=True)
 class Listing:
-    """A ROS graph. `types`: topic or service → type (``package/Type``), as far as it is given."""
+    """A ROS graph. `types`: topic or service → type (``package/Type``), as far as it is given. `qos`: the endpoints
+    as ``ros2 topic info --verbose`` prints them, each below its topic; empty if the source does not say."""
 
     nodes: tuple[Listed, ...]
     types: Mapping[str, str] = field(default_factory=dict)
+    qos: str = ""
 
     def text(self) -> str:
         """In the format of ``rosnode info``."""

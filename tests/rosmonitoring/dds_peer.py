@@ -153,6 +153,7 @@ def main():
     domain = Domain(number, LOOPBACK)  # noqa: F841 - it is left when this is gone
     participant = DomainParticipant(number)
     writers = {}
+    readers = []
     board = None
     for line in sys.stdin:
         said = json.loads(line)
@@ -166,6 +167,9 @@ def main():
                 topic = Topic(participant, said["topic"], kind)
                 owner = Publisher(participant, Qos(*part)) if part else participant
                 writers[said["name"]] = (kind, DataWriter(owner, topic, qos))
+            case "listen":
+                topic = Topic(participant, said["topic"], KINDS[said["kind"]])
+                readers.append(DataReader(participant, topic, Qos(*(QOS[name] for name in said["qos"]))))
             case "heard":  # how many hear it
                 answer = len(writers[said["name"]][1].get_matched_subscriptions())
             case "say":

@@ -11,6 +11,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +27,7 @@ from avow.base.diagnostics import Rejected
 from avow.cli.init import command as init
 from avow.ros.dds import ask_domain
 from avow.ros.listing import Listed, Listing
+from avow.system.code_ends import checked
 from avow.system.load import load_system
 from avow.system.plan import System
 
@@ -331,14 +333,15 @@ def test_without_the_package_it_is_told(make_system: Callable[..., System], monk
 @needs_dds
 @pytest.mark.parametrize("size", [24, 16])
 def test_a_running_graph_is_drafted(peer: Peer, size: int, tmp_path: Path) -> None:
-    """A node that announces itself as ROS 2's do, and a participant that does not say who it is."""
-    peer.write("robot1/s")
+    """A node that announces itself as ROS 2's do, and a participant without a name that requests more."""
+    peer.write("robot1/s", qos=("best_effort",))
     peer.write("other", "Single")
+    peer("listen", topic="rt/robot1/s", kind="Double", qos=["reliable"])
     peer("node", size=size, space="/robot1", name="sensor", writers=["robot1/s"])
     found: list[Listing] = []
     wait_for(lambda: found.append(ask_domain(peer.domain, seconds=0.5)) or len(found[-1].nodes) == 2)
-    assert found[-1] == Listing(
-        (Listed("/participant_1", ("/other",)), Listed("/robot1/sensor", ("/robot1/s",))),
+    assert replace(found[-1], qos="") == Listing(
+        (Listed("/participant_1", ("/other",), ("/robot1/s",)), Listed("/robot1/sensor", ("/robot1/s",))),
         {"/other": "std_msgs/Float32", "/robot1/s": "std_msgs/Float64"},
     )
     folder = tmp_path / "robot"
@@ -347,3 +350,6 @@ def test_a_running_graph_is_drafted(peer: Peer, size: int, tmp_path: Path) -> No
     drafted = load_system(folder / "contracts/robot")
     assert [node.name for node in drafted.contract.nodes] == ["participant_1", "sensor"]
     assert "ros_version: ros2" in (folder / "contracts/robot/plan.yaml").read_text("utf-8")
+    (wrong,) = (each for each in checked(drafted) if each.code == "ROS131")
+    assert "/robot1/s: sensor offers best_effort" in wrong.message
+    assert "participant_1 requests reliable" in wrong.message
