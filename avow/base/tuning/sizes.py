@@ -107,7 +107,8 @@ NOTED = 2_000
 """Plans and options of one folder of which it is kept between runs that their shape is right."""
 
 SHELVES = 32
-"""Folders of which it is kept between runs what their contracts' texts say: some 25 kB a node of ten clauses."""
+"""Folders of which it is kept between runs what their contracts' texts say (some 25 kB a node of ten clauses), and
+what their reports say about each node (some 150 kB)."""
 
 PROGRAM_FILES = 5_000
 """Files of an outside tool that its key covers: Dafny has 60, MCAPL 3,000; a script that names a folder of the system's
