@@ -174,6 +174,8 @@ class Assumption:
             where = f"assumptions.{method}.WORD, with a word of its text" if of_text else self.key
         elif section == "assumption":
             where = "environment, in an entry that assumes it"
+        elif "/assumption/" in self.key:
+            return f"(no plain words: {self.text})"
         else:
             where = self.key
         return f"(no plain words yet: write says: … under {where}, in plan.yaml)"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
@@ -69,12 +70,15 @@ def gates(
         *rates_gate(facts.policy, requirements, views),
         *_certified(facts, proofs, fresh),
     )
-    known = [g if g.passed or g.suggestions else replace(g, suggestions=(_general(g.id),)) for g in found]
+    known = [g if g.passed or g.suggestions else replace(g, suggestions=(_general(g.id, g.reason),)) for g in found]
     return tuple(sorted(known, key=lambda gate: (gate.passed, 0 if gate.passed else gate.suggestions[0].cost)))
 
 
-def _general(gate: str) -> Suggestion:
+def _general(gate: str, reason: str) -> Suggestion:
     """The next step of a gate if no claim has one of its own: what is wrong first, a better kind of proof last."""
+    if assumed := re.search(r"\w+/assumption/\w+", reason):
+        entry = f"{{obligation: {assumed[0]}, verdict: missing, reason: …, who: …, date: …, expires: …}}"
+        return Suggestion(f"accept the assumption: `accepted: [{entry}]`", cost=5)
     if gate not in _NEXT:
         return Suggestion(_EVIDENCE, cost=30)
     return Suggestion(_NEXT[gate], cost=70 if gate in ("proved", "certified") else -1)

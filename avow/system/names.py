@@ -241,7 +241,7 @@ def _findings(plan: Plan, root: Piece, nodes: dict[str, Node]) -> Iterator[Diagn
                 yield _unknown(f"{key}: obligation", obligation.text, known, obligation.span)
 
 
-_DERIVED = ("well-formed/", "sanity/", "composition/", "program/")
+_DERIVED = ("well-formed/", "sanity/", "composition/", "program/", "assumption/")
 
 
 # -- are a scenario's values values? What a domain or a table gives must be of the type that it is given for -----------
