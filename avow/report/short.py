@@ -20,6 +20,8 @@ def terminal_lines(case: Case) -> list[str]:
     verdict = f": {a.verdict}"
     title = _cut(f"{a.tone.mark} {case.title}", WIDTH - len(verdict))
     lines = [title + verdict]
+    if len(lines[0]) > WIDTH:
+        lines = [_cut(f"{a.tone.mark} {case.title}:"), *_cut_lines(a.verdict, 2)]
     lines += _cut_lines(a.beside, 3)
     lines += ["1 Claimed"]
     lines += [_cut(f"  {r.tone.mark} {r.id} {_standing(r)}: {_one(r)}") for r in case.listed]
