@@ -15,6 +15,7 @@ from avow.base.suggestions import nearest
 from avow.formulas.renaming import bound_names
 from avow.formulas.traversal import depth
 from avow.language.contract import Clause
+from avow.language.sorts import DataSort, EnumSort
 from avow.language.subterms import subterms
 from avow.language.terms import TRUE, And, Implies, Quantified, Quantifier, Term, Variable
 
@@ -268,20 +269,36 @@ _KINDS = {
 
 
 def _unknown_words(job: Job, setup: Setup) -> Iterator[Diagnostic]:
-    """A warning (AJPF134) for each row, property and entry of the environment file that uses such a word."""
+    """A warning (AJPF134) for each row, property and entry of the environment file that uses such a word; an error
+    (AJPF135) where the contract and the environment file do not declare it either."""
     known = _vocabulary(setup)
+    contract = _declared(job)
+    actions = {*setup.environment.after, *setup.environment.quiet}
     places = [(f"the row “{row.text}”", row.formula, row.span) for row in setup.rows]
     places += [(f"the property '{extra.name}'", extra.formula, extra.span) for extra in setup.extras]
     for what, formula, span in places:
         for atom in dict.fromkeys(psl.atoms(formula)):
             kind = _KINDS[atom.modality]
             if _word(atom.term) not in known[kind]:
-                yield _warning(what, _word(atom.term), kind, known[kind], span)
-    actions = {name for name, _ in known["action"]}
+                declared = contract | actions if kind == "action" else contract
+                yield _unknown(what, _word(atom.term), kind, known[kind], declared, span)
     span = job.method.options.at("environment")
-    for action in (*setup.environment.after, *sorted(setup.environment.quiet - {"print"})):
-        if action not in actions:
-            yield _warning(setup.environment_path.name, (action, 0), "action", known["action"], span)
+    for action in sorted(actions - {"print"} - {name for name, _ in known["action"]}):
+        near = nearest(action, {name for name, _ in known["action"]})
+        declared = contract if near else {action}
+        yield _unknown(setup.environment_path.name, (action, 0), "action", known["action"], declared, span)
+
+
+def _declared(job: Job) -> set[str]:
+    """The names that the contract has for what a node may do: its ports, and the values of its types."""
+    names = {port.name for port in (*job.node.inputs, *job.node.outputs)}
+    for _, sort in job.system.contract.types:
+        match sort:
+            case EnumSort():
+                names.update(sort.members)
+            case DataSort():
+                names.update(constructor.name for constructor in sort.constructors)
+    return names
 
 
 def _vocabulary(setup: Setup) -> dict[str, set[_Word]]:
@@ -315,10 +332,13 @@ def _shown(word: _Word) -> str:
     return f"{name}({', '.join('_' * arity)})" if arity else name
 
 
-def _warning(what: str, word: _Word, kind: str, known: set[_Word], span: Span | None) -> Diagnostic:
+def _unknown(what: str, word: _Word, kind: str, known: set[_Word], declared: set[str], span: Span | None) -> Diagnostic:
     message = f"{what} speaks of the {kind} {_shown(word)}, which neither the program nor the environment ever has"
-    hint = f"{kind}s that there are: {', '.join(sorted(map(_shown, known))[:12])}" if known else None
-    near = nearest(word[0], {name for name, _ in known} - {word[0]})
-    if near:  # a ban of a misspelt action would hold of any program
-        return Diagnostic("AJPF135", message, span, hint=f"did you mean `{near[0]}`?")
-    return Diagnostic("AJPF134", message, span, Severity.WARNING, hint=hint)
+    names = {name for name, _ in known}
+    same = sorted(_shown(other) for other in known if other[0] == word[0])
+    near = same or nearest(word[0], names | declared - {word[0]})
+    if not same and (word[0] in declared or (kind != "action" and not near)):
+        hint = f"{kind}s that there are: {', '.join(sorted(map(_shown, known))[:12])}" if known else None
+        return Diagnostic("AJPF134", message, span, Severity.WARNING, hint=hint)
+    hint = f"did you mean `{near[0]}`?" if near else "use a name of the program, the environment or the contract"
+    return Diagnostic("AJPF135", message, span, hint=hint)  # a ban of it would hold of any program

@@ -388,7 +388,13 @@ def test_words_that_the_agent_lacks_are_told(lift):
     assert message.startswith("AJPF135 ")
     assert "the action hallt(_)" in message
     (message,) = told({**TABLE, "in.call(f)": "B(cabin, call(f, _))"})
-    assert message.startswith("AJPF134 ")
+    assert message.startswith("AJPF135 ")
     assert "the belief call(_, _)" in message
+    for word, code in (("zzz(_)", "AJPF135"), ("go(_, _)", "AJPF135"), ("rest", "AJPF134"), ("never", "AJPF134")):
+        modality = "B" if word == "never" else "D"
+        environment = ONE_AT_A_TIME.replace("halt: {", "rest: {") if word == "rest" else ONE_AT_A_TIME
+        row = {"exists(n in NATURAL | out.motion == go(n))": f"{modality}(cabin, {word})"}
+        found = told({**TABLE, **row}, environment)
+        assert any(message.startswith(code) and "the row" in message for message in found), (word, found)
     (message,) = told(TABLE, ONE_AT_A_TIME.replace("halt: {", "hold: {"))
     assert "cabin.yaml speaks of the action hold" in message
