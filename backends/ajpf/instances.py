@@ -285,7 +285,7 @@ def _unknown_words(job: Job, setup: Setup) -> Iterator[Diagnostic]:
     span = job.method.options.at("environment")
     for action in sorted(actions - {"print"} - {name for name, _ in known["action"]}):
         near = nearest(action, {name for name, _ in known["action"]})
-        declared = contract if near else {action}
+        declared = contract if near else contract | {action}
         yield _unknown(setup.environment_path.name, (action, 0), "action", known["action"], declared, span)
 
 
@@ -336,8 +336,9 @@ def _unknown(what: str, word: _Word, kind: str, known: set[_Word], declared: set
     message = f"{what} speaks of the {kind} {_shown(word)}, which neither the program nor the environment ever has"
     names = {name for name, _ in known}
     same = sorted(_shown(other) for other in known if other[0] == word[0])
-    near = same or nearest(word[0], names | declared - {word[0]})
-    if not same and (word[0] in declared or (kind != "action" and not near)):
+    # a name of the program alone, beside a declared one, may be a slip of the program
+    near = same or nearest(word[0], names - declared if word[0] in declared else names | declared)
+    if not near and (word[0] in declared or kind != "action"):
         hint = f"{kind}s that there are: {', '.join(sorted(map(_shown, known))[:12])}" if known else None
         return Diagnostic("AJPF134", message, span, Severity.WARNING, hint=hint)
     hint = f"did you mean `{near[0]}`?" if near else "use a name of the program, the environment or the contract"

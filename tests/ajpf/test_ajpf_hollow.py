@@ -375,10 +375,10 @@ def test_properties_of_the_plan_range_over_the_scenario_where_the_instances_say_
 def test_words_that_the_agent_lacks_are_told(lift):
     """Seeded fault: a slip in the table, so that what is forbidden never comes, whatever the agent does."""
 
-    def told(rows, environment=ONE_AT_A_TIME):
+    def told(rows, environment=ONE_AT_A_TIME, stop="halt"):
         contract = (lift().root / "system.rcl").read_text()
         contract = contract[: contract.rindex("}")] + STAYS
-        program = PROGRAM + "+call(F) : { B shut } <- go(F);\n+open : { True } <- halt(0);\n"
+        program = PROGRAM + "+call(F) : { B shut } <- go(F);\n+open : { True } <- halt(0);\n".replace("halt", stop)
         files = {"system.rcl": contract, "cabin.gwen": program, "cabin.yaml": environment}
         found = BACKEND.check(lift({"predicates": dict(rows)}, files))
         return [f"{d.code} {d.message}" for d in found if d.code in ("AJPF134", "AJPF135")]
@@ -396,5 +396,8 @@ def test_words_that_the_agent_lacks_are_told(lift):
         row = {"exists(n in NATURAL | out.motion == go(n))": f"{modality}(cabin, {word})"}
         found = told({**TABLE, **row}, environment)
         assert any(message.startswith(code) and "the row" in message for message in found), (word, found)
+    (row, environment) = told(TABLE, stop="halts")  # the slip is the program's
+    assert row.startswith("AJPF135 ")
+    assert environment.startswith("AJPF135 ")
     (message,) = told(TABLE, ONE_AT_A_TIME.replace("halt: {", "hold: {"))
     assert "cabin.yaml speaks of the action hold" in message
