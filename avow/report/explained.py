@@ -25,7 +25,8 @@ from avow.report.wording import MEANINGS
 Explanation = tuple[str, list[str]]
 """A heading, and lines."""
 
-_MARK = re.compile(r"[0-9a-f]{12,64}\Z|.*[./]")
+_DIGEST = re.compile(r"[0-9a-f]{12,64}\Z")
+_MARK = re.compile(rf"{_DIGEST.pattern}|.*[./]")
 """A digest, or the name of a file."""
 _CODE = re.compile(r"[A-Z]{2,9}[0-9]{3}\Z")
 
@@ -111,7 +112,7 @@ def named(case: Case) -> Iterator[tuple[str, tuple[str, ...], list[str]]]:
 
 
 def _places(value: object, name: str, path: str = "") -> Iterator[str]:
-    """Where plain data has a text that is, or begins with, the name."""
+    """Where plain data has a text that is the name, or begins with it: a digest's first digits, or whole words."""
     if isinstance(value, dict):
         for key, item in value.items():
             if key == name:
@@ -121,8 +122,12 @@ def _places(value: object, name: str, path: str = "") -> Iterator[str]:
     elif isinstance(value, list):
         for at, item in enumerate(value):
             yield from _places(item, name, f"{path}[{at}]")
-    elif isinstance(value, str) and (value == name or (len(name) >= 12 and value.startswith(name))):
+    elif isinstance(value, str) and (value == name or (len(name) >= 12 and _begins(value, name))):
         yield f"{path}: {value}"[1:]
+
+
+def _begins(value: str, name: str) -> bool:
+    return value.startswith(name) and (_DIGEST.match(name) is not None or not re.match(r"\w", value[len(name) :]))
 
 
 def _entries(case: Case) -> Iterator[Entry]:

@@ -183,3 +183,12 @@ def test_a_mark_that_is_nowhere_is_not_explained() -> None:
 def test_an_obligation_is_not_explained_by_its_places_in_the_report() -> None:
     found = rover_case()
     assert list(explained(found, found.obligations[0].id)) == []
+
+
+def test_the_beginning_of_a_name_is_not_explained_by_the_places_of_the_whole() -> None:
+    found = rover_case()
+    whole = found.obligations[0].id
+    assert list(explained(found, whole[:-1])) == []
+    with pytest.raises(Rejected) as refused:
+        find_claim([found], whole[:-1])
+    assert whole in (refused.value.diagnostics[0].hint or "")
