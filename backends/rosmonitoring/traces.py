@@ -10,6 +10,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from avow.base.codec import once
 from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.base.suggestions import nearby, nearest
 from avow.ros import bags
@@ -30,7 +31,7 @@ class Recorded:
     event: Event
 
 
-_DECODER = json.JSONDecoder(parse_float=str.encode)
+_DECODER = json.JSONDecoder(parse_float=str.encode, object_pairs_hook=once)
 
 
 def parse_event(text: str) -> Event:

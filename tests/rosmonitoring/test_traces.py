@@ -101,3 +101,14 @@ def test_digests_change_with_content_and_names(tmp_path: Path) -> None:
     before = digest_trace(folder)
     (folder / "x").rename(folder / "y")
     assert digest_trace(folder) != before
+
+
+def test_a_key_that_stands_twice_is_a_located_error(tmp_path: Path) -> None:
+    trace = tmp_path / "t.jsonl"
+    trace.write_text('{"topic": "y", "time": 0, "data": 1}\n{"topic": "x", "time": 1, "data": 4.0, "data": 8.0}\n')
+    with pytest.raises(Rejected) as refused:
+        list(read_trace(trace))
+    (found,) = refused.value.diagnostics
+    assert '"data" stands twice' in found.message
+    assert found.span is not None
+    assert found.span.line == 2
