@@ -3,6 +3,7 @@ report."""
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 
 from avow.assurance.answers import ChangeLine
@@ -19,17 +20,32 @@ def render_comparison(old: str, new: str, changes: Sequence[tuple[str, ChangeLin
         "compare.html.j2",
         old=old,
         new=new,
-        line=_line(changes, worse),
+        line=_line(changes),
         banner="bad" if worse else "open" if any(c.kind in ("edit", "meaning") for _, c in changes) else "good",
-        systems={name: [c for n, c in changes if n == name] for name in dict.fromkeys(name for name, _ in changes)},
+        systems={
+            name: [c for n, c in changes if n == name and c.kind != "rerun"]
+            for name in dict.fromkeys(name for name, c in changes if c.kind != "rerun")
+        },
         marks=MARKS,
         folded=CHANGES_UNFOLDED,
     )
 
 
-def _line(changes: Sequence[tuple[str, ChangeLine]], worse: int) -> str:
+_WORDS = {
+    "✘": "no longer shown",
+    "▼": "weaker, or more assumed",
+    "▲": "better",
+    "≠": "changed",
+    "+": "new",
+    "⟲": "re-run with the same answer",
+}
+
+
+def _line(changes: Sequence[tuple[str, ChangeLine]]) -> str:
+    """How many changes have each mark, in the words of the mark."""
     if not changes:
         return "Nothing changed."
-    if all(change.kind == "rerun" for _, change in changes):
+    number = Counter(MARKS.get(change.kind, "▼") for _, change in changes)
+    if set(number) == {"⟲"}:
         return "Re-run; every answer is the same."
-    return f"{worse} of {len(changes)} changes are for the worse." if worse else "Nothing is worse than before."
+    return "; ".join(f"{mark} {number[mark]} {words}" for mark, words in _WORDS.items() if number[mark])

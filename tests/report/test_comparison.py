@@ -268,6 +268,8 @@ def test_the_page_says_what_the_terminal_says(tmp_path: Path, monkeypatch: pytes
     text = " ".join(Page((tmp_path / "d.html").read_text(encoding="utf-8")).text)
     assert len(said["changes"]) > 3
     for change in said["changes"]:
+        if change["kind"] == "rerun":  # only counted, as on the terminal
+            continue
         assert change["words"] in text
         assert all(line in text for line in change.get("edits", [])[:8])
     for nowhere in ("no/such/../\0/x.html", "", "x" * 5000):
@@ -277,3 +279,14 @@ def test_the_page_says_what_the_terminal_says(tmp_path: Path, monkeypatch: pytes
     result = run.invoke(diff, ["old", "new", "--html", "blocked/x.html"], standalone_mode=False)
     assert isinstance(result.exception, Rejected)
     assert result.exception.diagnostics[0].code == "DIFF002"
+
+
+def test_the_headline_counts_the_marks_of_the_rows() -> None:
+    kinds = ("open", "weaker", "deficit", "edit", "better", "new", "rerun", "rerun")
+    text = render_comparison("a", "b", [("s", ChangeLine(kind, kind, kind, "", "")) for kind in kinds])
+    line = re.search(r"<b>(.*?)</b>", text)
+    assert line is not None
+    for mark, number in (("✘", 1), ("▼", 2), ("≠", 1), ("▲", 1), ("+", 1), ("⟲", 2)):
+        assert f"{mark} {number} " in line[1]
+        rows = len(re.findall(f'<span aria-hidden="true">{re.escape(mark)}</span> [a-z]', text))
+        assert rows == (0 if mark == "⟲" else number)
