@@ -46,6 +46,12 @@ class LikelyQuestion:
         if why := unshown(composition.frame, self.requirement):
             return Answer(Verdict.UNKNOWN, why)
         answer = self.formal(composition, bounds)
+        frame = composition.frame
+        earlier = frame.memory(of=self.requirement.id) or any(edge.delayed for edge in frame.graph.edges)
+        if answer.verdict is Verdict.REFUTED and earlier:
+            # a guarantee may have failed at an earlier step, which refutes no probability
+            text = f"it does not follow at each step at which {', '.join(self.formal.likely)} hold: {answer.summary}"
+            return replace(answer, verdict=Verdict.UNKNOWN, summary=text, details={**answer.details, "genuine": False})
         if answer.verdict is not Verdict.PROVED:
             return answer
         shown = chance.text(chance.least(asked, each))

@@ -30,7 +30,7 @@ class ExperimentBackend(Backend):
 
     name = "experiment"
     title = "recorded runs, judged by the guarantee and exact binomial statistics"
-    version = "12"
+    version = "13"
     strength = Verdict.TESTED
     remembers = True
     chances = True

@@ -71,6 +71,9 @@ class Claim:
     """The texts of the interpretations that it, or an assumption, needs."""
     chance: Chance | None = None
     """Of a guarantee with a probability."""
+    within: tuple[Formula, ...] = ()
+    """The conditions inside the claim of a guarantee with a probability: they leave no trial out, but each has to be
+    met in some."""
 
     @property
     def trial(self) -> Trial | None:
@@ -97,6 +100,8 @@ class Judged:
     shown: tuple[tuple[str, str], ...] = ()
     """What the monitors show of the failure, and why it is one."""
     why: str = ""
+    within: frozenset[int] = frozenset()
+    """As `met`, for `Claim.within`."""
 
 
 def claim(clause: Clause, assumptions: Iterable[Clause], meanings: Iterable[Interpretation], known: set[str]) -> Claim:
@@ -131,12 +136,14 @@ def claim(clause: Clause, assumptions: Iterable[Clause], meanings: Iterable[Inte
         waits,
         tuple(one.text for one in known_meanings if any(interpreted(each, [one]) != each for each in formulas)),
         chance,
+        tuple(ready(_named(each, formula), each) for each in _conditions(formula, assumed)) if chance else (),
     )
 
 
 def judged(claim: Claim, steps: Sequence[Step]) -> Judged:
     """One trial, from its first step."""
     keeper, met, asked, waits, doubt, undecided = Keeper(claim.cells), set[int](), False, False, "", ""
+    within = set[int]()
     for at, ports in enumerate(steps):
         values = keeper.at(ports)
         assumed = {formula.name: formula.holds(values) for formula in claim.assumptions}
@@ -148,13 +155,14 @@ def judged(claim: Claim, steps: Sequence[Step]) -> Judged:
         if _demanded(claim, values):
             asked = True
             met |= {n for n, condition in enumerate(claim.conditions) if condition.holds(values) is True}
+        within |= {n for n, condition in enumerate(claim.within) if condition.holds(values) is True}
         held = claim.holds.holds(values)
         if held is False:
-            return Judged(frozenset(met), True, broken=at, undecided=doubt)
+            return Judged(frozenset(met), True, broken=at, undecided=doubt, within=frozenset(within))
         undecided = undecided or (f"{claim.holds.name} has no value" if held is None else "")
         waits = claim.waits is not None and claim.waits.holds(values) is not False
         keeper.advance(ports)
-    return Judged(frozenset(met), asked, open=waits, undecided=doubt or undecided)
+    return Judged(frozenset(met), asked, open=waits, undecided=doubt or undecided, within=frozenset(within))
 
 
 def _demands(formula: Term) -> Evaluator | None:

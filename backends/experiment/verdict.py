@@ -190,7 +190,9 @@ def _unmet(claim: Claim, found: Sequence[tuple[Run, Judged]]) -> str:
     if not claim.conditions and not any(one.asked for one in counted):
         return f"the guarantee demands nothing in any of {runs}"
     met = {n for one in counted for n in one.met}
+    within = {n for one in counted for n in one.within}
     unmet = [formula.name for n, formula in enumerate(claim.conditions) if n not in met]
+    unmet += [formula.name for n, formula in enumerate(claim.within) if n not in within]
     return f"in none of {runs} was its condition met: {unmet[0]}" if unmet else ""
 
 

@@ -105,6 +105,17 @@ def test_what_cannot_be_composed_is_an_error(tmp_path: Path, asked: str, support
     assert code in {d.code for d in found.value.diagnostics}
 
 
+def test_a_failure_at_an_earlier_step_refutes_no_probability(tmp_path: Path) -> None:
+    """The brake sees what the eye saw a step before: the requirement holds with 0.9, but not by this argument."""
+    rcl = """node eye { inputs() outputs( seen : BOOL ) topics() guarantee sees with probability >= 0.9 ( out.seen ) }
+node brake { inputs( seen : BOOL ) outputs( last : BOOL ) topics() guarantee is ( out.last == in.seen ) }"""
+    plan = """connections: [{from: eye.seen, to: brake.seen, delayed: true, initial: "TRUE"}]
+compose: {whole: {persistence: &said {because: latched}, one_output: *said}}
+requirements: {R: {text: t, formula: brake.last, probability: 0.9, supported_by: [eye.sees, brake.is]}}
+"""
+    assert outcomes(make(tmp_path, rcl, plan))["R"].verdict is Verdict.UNKNOWN
+
+
 def test_it_discharges_no_assumption(tmp_path: Path) -> None:
     rcl = RCL.replace("guarantee stops", "assume told ( in.seen )  guarantee stops")
     plan = f"requirements: {{R: {{text: t, formula: {STOPS}, probability: 0.9, supported_by: [eye.sees]}}}}{REST}"

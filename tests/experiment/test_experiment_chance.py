@@ -52,8 +52,9 @@ def test_what_counts_as_a_trial(tmp_path: Path) -> None:
     """Without `given` every row counts; an inner condition of the claim leaves none out; nothing given is vacuous."""
     every = judged(tmp_path / "a", "0.9", "in.person -> out.found", [SEEN] * 30 + [NOBODY] * 30)
     assert (every.verdict, every.bound["triggered"]) == (Verdict.TESTED, 60)
-    none = judged(tmp_path / "b", "0.9 given (in.person)", "out.found", [NOBODY] * 60)
-    assert (none.verdict, none.vacuous) == (Verdict.TESTED, True)
+    for head, claim in (("0.9 given (in.person)", "out.found"), ("0.9", "in.person -> out.found")):
+        none = judged(tmp_path / claim.replace(" ", ""), head, claim, [NOBODY] * 60)
+        assert (none.verdict, none.vacuous) == (Verdict.TESTED, True)
 
 
 def test_steps_and_runs_are_different_trials(tmp_path: Path) -> None:
