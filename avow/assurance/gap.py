@@ -181,8 +181,10 @@ def suggest(view: ObligationView, demand: Demand | None, facts: Facts) -> Sugges
             known = next((str(r.details["next"]) for r in view.records if "next" in r.details), "")
             severe = view.obligation.kind is Kind.GUARANTEE and view.criticality == CRITICALITIES[0]
             accept = "" if severe else ", or accept it with a dated reason"
-            text = f"repair what the counterexample of {short(view.id)} shows{accept}"
-            return Suggestion(known or text, cost=-2)  # what is wrong comes before what is lacking
+            shown = f"what the counterexample of {short(view.id)} shows"
+            if view.obligation.kind is Kind.SANITY and view.records:  # its summary names the clauses at fault
+                shown = f"{short(view.id).partition(' (')[0]}: {view.records[-1].summary}"
+            return Suggestion(known or f"repair {shown}{accept}", cost=-2)  # what is wrong comes before what is lacking
         case Status.CONTRADICTORY:
             text = "one method proves it and another refutes it; repair what is wrong, or find out which tool is"
             return Suggestion(f"{short(view.id)}: {text}", cost=-2)

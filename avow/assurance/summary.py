@@ -158,10 +158,8 @@ def _no_longer_asked(refuting: Evidence, view: ObligationView, views: Sequence[O
         missed = sorted(path for path, mark in refuting.inputs.items() if record.inputs.get(path) != mark)
         if missed and (recorded or record.inputs.items() <= refuting.inputs.items()):
             return f"has it read {listed(missed, 3)}{_relying(missed, refuting, views)}"
-        if (record.inputs, record.tool_version) == (
-            refuting.inputs,
-            refuting.tool_version,
-        ) and CASE not in refuting.details:
+        alike = (record.inputs, record.tool_version) == (refuting.inputs, refuting.tool_version)
+        if alike and CASE not in refuting.details:
             return "has the options with which it did"
     return ""
 

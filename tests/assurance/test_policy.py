@@ -603,6 +603,16 @@ def test_the_first_step_is_about_what_is_refuted_and_each_names_its_claim(lesser
         assert steps[1] == "give the method inputs that meet the trigger of n.lacking"
 
 
+def test_the_first_step_about_a_contract_names_the_clauses_at_fault() -> None:
+    whole = obligation("n", Kind.SANITY, "consistent")
+    none = replace(
+        evidence(whole, Verdict.REFUTED, "sanity"), summary="no inputs and outputs meet air and wet together"
+    )
+    found = case(system({"n": ["air", "wet"]}), [guarantee("n", "air"), whole], [none])
+    first = next(gate.suggestions[0].text for gate in found.gates if gate.id == "refuted")
+    assert first.startswith("repair n: no inputs and outputs meet air and wet together")
+
+
 def test_the_gates_that_fail_are_in_the_order_of_what_to_do() -> None:
     """What is wrong, then what lacks a reason, then what lacks a method: also on the terminal's last line."""
     subject = system({"n": ["g", "h"]}, plans=[node_plan("n", "high", "hoare")])
