@@ -19,6 +19,7 @@ from avow.language.contract import Contract
 from avow.language.lexer import KEYWORDS
 from avow.system.formulas import check_formulas
 from avow.system.graph import dataflow
+from avow.system.include import Load, include
 from avow.system.launched import started
 from avow.system.links import completed
 from avow.system.names import check_names
@@ -58,6 +59,8 @@ class Rest:
     """The paths of the plan's faulty values."""
     lost: bool = False
     """Whether a declaration has no name of its own: its node cannot be read, or its name is given twice."""
+    absent: frozenset[str] = frozenset()
+    """The subsystems that could not be included."""
 
     def may_follow(self, found: Diagnostic, node: str = "") -> bool:
         """Whether a finding (about a node's method) may follow from a reported fault: of the contract, or of a value of
@@ -86,8 +89,8 @@ def rest_of(folder: Path) -> Rest | None:
     return Rest(System(plan, part), False, root, dropped | words, faults, _doubtful(plan, part, found), wrong, lost)
 
 
-def every_fault(folder: Path, found: Iterable[Diagnostic]) -> tuple[Diagnostic, ...]:
-    """`found` are the diagnostics of loading the system."""
+def every_fault(folder: Path, found: Iterable[Diagnostic], load: Load) -> tuple[Diagnostic, ...]:
+    """`found` are the diagnostics of loading the system, `load` the way to the systems that it includes."""
     from avow.language.load import check_paths
 
     told = list(found)
@@ -96,7 +99,11 @@ def every_fault(folder: Path, found: Iterable[Diagnostic]) -> tuple[Diagnostic, 
         if (folder / "plan.yaml").is_file():
             told += [d for d in check_paths(sorted(folder.resolve().glob("*.rcl")))[1] if d.is_error]
         return in_order(told)
-    return in_order([*told, *rest.found, *(d for d in _of_names(rest) if not _follows(d, rest))])
+    plan, contract, inner = include(rest.system.plan, rest.system.contract, load)
+    taken = {subsystem.name for subsystem in plan.subsystems}
+    absent = frozenset(subsystem.name for subsystem in rest.system.plan.subsystems) - taken
+    rest = replace(rest, system=System(plan, contract), absent=absent)
+    return in_order([*told, *rest.found, *inner, *(d for d in _of_names(rest) if not _follows(d, rest))])
 
 
 def in_order(found: Iterable[Diagnostic]) -> tuple[Diagnostic, ...]:
@@ -218,10 +225,11 @@ def _tried(look: Callable[[], Iterable[Diagnostic]]) -> Iterable[Diagnostic]:
 
 
 def _follows(found: Diagnostic, rest: Rest) -> bool:
-    """Whether it misses names that a faulty contract may have lost, or that a reported fault concerns."""
+    """Whether it misses names that a faulty contract or subsystem may have lost, or that a reported fault concerns."""
     names = _QUOTED.findall(found.message)
     last = [_WORD.findall(name)[-1] for name in names if _WORD.search(name)]
-    return found.code == "PLAN106" and (rest.lost or (bool(last) and set(last) <= rest.told))
+    inner = any(name == sub or name.startswith((f"{sub}.", f"{sub}_")) for name in names for sub in rest.absent)
+    return found.code == "PLAN106" and (rest.lost or inner or (bool(last) and set(last) <= rest.told))
 
 
 def _text(path: Path) -> str:

@@ -13,7 +13,7 @@ from avow.language.contract import Contract
 from avow.system.faults import every_fault
 from avow.system.formulas import check_formulas
 from avow.system.graph import dataflow
-from avow.system.include import include, still_open
+from avow.system.include import Load, include, still_open
 from avow.system.launched import started
 from avow.system.links import completed
 from avow.system.names import check_names
@@ -33,10 +33,12 @@ def load_system(folder: Path, shelf: Shelf | None = None) -> System:
 
     Raises Rejected with every fault found in the plan, in the contract, and in the systems that it includes.
     """
+    known: dict[Path, System] = {}
     try:
-        return _load(folder, (), {}, shelf)
+        return _load(folder, (), known, shelf)
     except Rejected as rejected:
-        raise Rejected(*every_fault(folder, rejected.diagnostics)) from None
+        load = _parts((folder.resolve(),), known, shelf)
+        raise Rejected(*every_fault(folder, rejected.diagnostics, load)) from None
 
 
 def _load(folder: Path, within: tuple[Path, ...], known: dict[Path, System], shelf: Shelf | None) -> System:
@@ -87,19 +89,7 @@ def _linked(
     shelf: Shelf | None,
 ) -> System:
     """The system of a plan and its contract; `faults` are those of the plan's values."""
-    chain = (*within, folder.resolve())
-
-    def part(inner: Path) -> System:
-        if inner in chain:
-            shown = " → ".join(name.name for name in (*chain[chain.index(inner) :], inner))
-            raise Rejected(Diagnostic("PLAN110", f"systems take in one another: {shown}"))
-        if len(chain) > SYSTEMS_WITHIN:
-            raise Rejected(Diagnostic("PLAN110", f"systems are taken in to more than {SYSTEMS_WITHIN} levels"))
-        if inner not in known:
-            known[inner] = _load(inner, chain, known, shelf)
-        return known[inner]
-
-    plan, contract, more = include(plan, contract, part)
+    plan, contract, more = include(plan, contract, _parts((*within, folder.resolve()), known, shelf))
     faults += more
     if any(fault.is_error for fault in more):
         raise Rejected(*faults)
@@ -125,6 +115,22 @@ def _linked(
     if any(fault.is_error for fault in faults):
         raise Rejected(*faults)
     return system
+
+
+def _parts(chain: tuple[Path, ...], known: dict[Path, System], shelf: Shelf | None) -> Load:
+    """How a system loads those that it includes; `chain`: the folders of those that include it, and its own."""
+
+    def part(inner: Path) -> System:
+        if inner in chain:
+            shown = " → ".join(name.name for name in (*chain[chain.index(inner) :], inner))
+            raise Rejected(Diagnostic("PLAN110", f"systems take in one another: {shown}"))
+        if len(chain) > SYSTEMS_WITHIN:
+            raise Rejected(Diagnostic("PLAN110", f"systems are taken in to more than {SYSTEMS_WITHIN} levels"))
+        if inner not in known:
+            known[inner] = _load(inner, chain, known, shelf)
+        return known[inner]
+
+    return part
 
 
 def load_bare(files: Sequence[Path], name: str | None = None, shelf: Shelf | None = None) -> System:

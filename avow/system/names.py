@@ -90,11 +90,11 @@ def _environment(plan: Plan, root: Piece, nodes: dict[str, Node]) -> Iterator[Di
 
 def _requirements(plan: Plan, root: Piece, nodes: dict[str, Node]) -> Iterator[Diagnostic]:
     goals = [*(goal.name for goal in plan.compose), *(subsystem.name for subsystem in plan.subsystems)]
-    likely = {f"{n.name}.{g.name}": g.chance for n in nodes.values() for g in n.guarantees if g.chance is not None}
+    chances = {f"{n.name}.{g.name}": g.chance for n in nodes.values() for g in n.guarantees}
     for name, _, requirement in root.keyed("requirements"):
         asked = requirement.at("probability")
         if asked is not None:
-            yield from _unlikely(f"requirements.{name}.probability", asked, requirement, likely)
+            yield from _unlikely(f"requirements.{name}.probability", asked, requirement, chances)
         for item in requirement.each("supported_by"):
             owner, dot, _ = item.text.partition(".")
             if item.text in goals or (not dot and owner in nodes):
@@ -103,18 +103,21 @@ def _requirements(plan: Plan, root: Piece, nodes: dict[str, Node]) -> Iterator[D
             known = [f"{n}.{g.name}" for n in nodes for g in nodes[n].guarantees if n == owner or owner not in nodes]
             if item.text not in known:
                 yield _unknown(where, item.text, known if owner in nodes else [*nodes, *goals, *known], item.span)
-            elif item.text in likely and asked is None and (requirement.at("formula") or requirement.at("temporal")):
+            elif chances[item.text] and asked is None and (requirement.at("formula") or requirement.at("temporal")):
                 message = f"{where}: {item.text} holds with a probability, and no proof of a formula may use it"
                 hint = "give the requirement a `probability`, or leave this guarantee out here"
                 yield Diagnostic("PLAN141", message, item.span, hint=hint)
 
 
-def _unlikely(where: str, asked: Piece, requirement: Piece, likely: Mapping[str, Chance]) -> Iterator[Diagnostic]:
+def _unlikely(
+    where: str, asked: Piece, requirement: Piece, chances: Mapping[str, Chance | None]
+) -> Iterator[Diagnostic]:
     """Why a requirement's probability cannot be composed of those of guarantees."""
     if requirement.at("formula") is None:
         yield Diagnostic("PLAN142", f"{where}: there is no `formula` that has it", asked.span, hint="add a `formula`")
-    below = {item.text: likely[item.text] for item in requirement.each("supported_by") if item.text in likely}
-    if not below:
+    named = [item.text for item in requirement.each("supported_by")]
+    below = {name: chance for name in named if (chance := chances.get(name))}
+    if not below and not any("." in name and name not in chances for name in named):  # that is an error of its own
         hint = "name one as `node.guarantee`, or leave out `probability`"
         message = f"{where}: no guarantee with a probability is under `supported_by`"
         yield Diagnostic("PLAN142", message, asked.span, hint=hint)

@@ -176,6 +176,35 @@ def test_what_a_lost_declaration_takes_along_is_no_fault_of_the_plan(
     assert {told for _, told in check(folder)} == {code}
 
 
+@pytest.mark.parametrize(
+    ("inner", "support", "codes"),
+    [
+        ("out.y", "s_n.g", ["PLAN103"]),
+        ("out.y", "s_n.typo", ["PLAN103", "PLAN106"]),
+        ("out.yy", "s_n.g", ["PLAN103", "PLAN110", "RCL203"]),
+    ],
+)
+def test_names_of_an_included_system_are_looked_up_beside_other_faults(
+    inner: str, support: str, codes: list[str], tmp_path: Path
+) -> None:
+    plan = f"nods: 1\nsubsystems: {{s: {{system: ../in}}}}\nrequirements: {{R: {{text: t, supported_by: [{support}]}}}}"
+    for folder, text, node, output in (("in", "{}", "n", inner), ("all", plan, "m", "out.y")):
+        (tmp_path / folder).mkdir()
+        (tmp_path / folder / "plan.yaml").write_text(text)
+        rcl = f"node {node} {{ inputs() outputs( y : BOOL ) topics() guarantee g ( {output} ) }}"
+        (tmp_path / folder / "n.rcl").write_text(rcl)
+    assert sorted(code for _, code in surveyed(tmp_path / "all")) == codes
+
+
+@pytest.mark.parametrize("fault", ["out.sen", "out.seen or"])
+def test_a_probability_that_cannot_be_read_is_not_missing(fault: str, tmp_path: Path) -> None:
+    node = f"node n {{ inputs() outputs( seen : BOOL ) topics() guarantee g with probability >= 0.9 ( {fault} ) }}"
+    (tmp_path / "n.rcl").write_text(node)
+    requirement = "{text: t, formula: n.seen, probability: 0.8, supported_by: [n.g]}"
+    (tmp_path / "plan.yaml").write_text(f"requirements: {{R: {requirement}}}\n")
+    assert {code[:3] for _, code in surveyed(tmp_path)} == {"RCL"}
+
+
 def test_without_faults_there_is_a_system(tmp_path: Path) -> None:
     assert load_system(place(tmp_path, [])).name == "home"
     assert check(tmp_path) == []

@@ -160,8 +160,7 @@ def test_an_included_system_has_given_a_value(tmp_path: Path, value: str, faults
         load_system(whole)
     except Rejected as rejected:
         found += rejected.diagnostics
-    assert [d.code for d in found if d.code == "PLAN139"] == faults, found
-    assert bool(found) is bool(faults)
+    assert [d.code for d in found] == faults, found  # not also that the included node is unknown
     assert all(d.span is not None for d in found)
 
 
