@@ -16,7 +16,7 @@ from avow.backends.rosmonitoring import BACKEND, options
 from avow.backends.rosmonitoring.command import _Output, _report
 from avow.backends.rosmonitoring.engine import Monitor
 from avow.backends.rosmonitoring.session import Session, session
-from avow.backends.rosmonitoring.watched import Fault
+from avow.backends.rosmonitoring.watched import Fault, coverage
 from avow.base.diagnostics import Rejected
 from avow.base.verdict import Outcome, Verdict
 from avow.pipeline.plan_check import of_plan
@@ -246,6 +246,15 @@ def test_times_that_do_not_go_on_are_no_evidence_for_seconds(
     assert plain.verdict is Verdict.MONITORED, plain
     assert timed.verdict is (Verdict.UNKNOWN if stands else Verdict.MONITORED), timed
     assert ("one time" in timed.summary) is stands
+
+
+def test_a_value_is_initial_only_if_the_plan_gives_it(make_system: Make) -> None:
+    running = session(make_system(ONE.replace("out.v == 0", "within[1 s](out.v == 0)")), ["n"])
+    said = events(*[("r", 200.0)] * 3, times=(0.0, 1.0, 9.0))
+    assert not [*(v for event in said for v in running.step(event)), *running.finish()]
+    ((*_, tally),) = running.clauses()
+    assert "initial" not in coverage(tally)
+    assert tally.supposed
 
 
 PAIRINGS: list[dict[str, Any]] = [
