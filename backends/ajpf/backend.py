@@ -27,7 +27,7 @@ class AjpfBackend(Backend):
 
     name = "ajpf"
     title = "agent programs (Gwendolen), model-checked against properties instantiated from the contract"
-    version = "12"
+    version = "13"
     strength = Verdict.CHECKED
     uses_steps = False
     uses_wiring = False

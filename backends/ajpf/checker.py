@@ -18,7 +18,7 @@ from .explore import Graph, System
 from .intentions import Frame
 from .interpreter import BITS, QUEUE, Agent
 from .mind import NONE
-from .psl import TRUE, Atom, Formula, Modality, Not, atoms, automaton_of, compiled, conjunction
+from .psl import TRUE, Atom, Formula, Modality, Not, about_acts, atoms, automaton_of, compiled, conjunction
 from .syntax import DeedKind, Sign
 from .tautology import Laws, is_valid, standing
 from .terms import Struct, Term, named_apart, unify
@@ -211,13 +211,14 @@ class Checker:
     def _answered(self, wanted: Property) -> bool:
         """Whether there is an occasion (the trigger is met, and was not just before) to which the forbidden formula is
         the answer: on every path, it holds when the agent next acts or the environment next draws. An action done
-        before the occasion is no answer to it; a formula that held before may hold only until then."""
+        before the occasion is no answer to it; a formula that held before may hold only until then. A trigger about an
+        action is met by that action only: an older one may have been done for other inputs."""
         if wanted.trigger is None or wanted.forbidden is None or self.graph.unfinished is not None:
             return False
         graph, labels, core = self.graph, self.labels, self.graph.system.core
         states = graph.states
         meant, banned = compiled(wanted.trigger, self.places), compiled(wanted.forbidden, self.places)
-        needs_act = any(atom.modality is Modality.DID for atom in atoms(wanted.forbidden))
+        needs_act, stale = about_acts(wanted.forbidden), about_acts(wanted.trigger)
 
         def acted(state: int, target: int) -> bool:
             return bool(core(states[target]).last != core(states[state]).last)
@@ -227,7 +228,8 @@ class Checker:
 
         triggered = [meant(label) for label in labels]
         occasions = {s for s in graph.initial if triggered[s]}
-        occasions.update(t for s in range(len(graph)) if not triggered[s] for t in graph.after(s) if triggered[t])
+        met = ((s, t) for s in range(len(graph)) if not triggered[s] for t in graph.after(s) if triggered[t])
+        occasions.update(t for s, t in met if acted(s, t) or not stale)
         good: set[int] = set()
         for component in strong_components(occasions, waiting):
             state = component[0]

@@ -201,7 +201,7 @@ class Mapper:
         """``exists(x | P and Q)``: rows may not separate parts that share x."""
         names = {v.name for v in term.variables}
         items = conjuncts(term.body)
-        static = [i for i in items if not bound_names(i) - names and not _has_output(i)]
+        static = [i for i in items if not bound_names(i) - names and not has_output(i)]
         if static:
             possible = Quantified(Quantifier.EXISTS, _used(term, static), conjunction(static), term.span)
             if self._decided(possible) is False:
@@ -235,7 +235,7 @@ class Mapper:
         if self.words.setdefault(formula, meaning) != meaning:  # the row omits an index: one formula for several
             self.words[formula] = row.say({})
         body = term.body if isinstance(term, Not) else term
-        return Unit(formula, _has_output(term), _only_forbids(term), body)
+        return Unit(formula, has_output(term), _only_forbids(term), body)
 
     def _constant(self, formula: Formula) -> bool | None:
         if formula not in self.constants:
@@ -252,7 +252,7 @@ def _items(pattern: Term) -> tuple[Term, ...]:
     return pattern.items if isinstance(pattern, And | Or) else (pattern,)
 
 
-def _has_output(term: Term) -> bool:
+def has_output(term: Term) -> bool:
     return any(isinstance(t, Variable) and t.role is Role.OUTPUT for t in subterms(term))
 
 
@@ -260,9 +260,9 @@ def _only_forbids(term: Term) -> bool:
     """Whether a formula in normal form only excludes values of outputs."""
     match term:
         case Not(body=body):
-            return _has_output(body)
+            return has_output(body)
         case And(items=items) | Or(items=items):
-            return _has_output(term) and all(_only_forbids(item) for item in items if _has_output(item))
+            return has_output(term) and all(_only_forbids(item) for item in items if has_output(item))
         case Quantified(body=body):
             return _only_forbids(body)
         case _:  # an atom requires a value

@@ -118,6 +118,11 @@ def with_atoms(formula: Formula, change: Callable[[Atom], Formula]) -> Formula:
     return type(formula)(made) if isinstance(formula, And | Or) else type(formula)(*made)
 
 
+def about_acts(formula: Formula) -> bool:
+    """Whether it speaks of the last action, which may be older than all else that holds."""
+    return any(atom.modality is Modality.DID for atom in atoms(formula))
+
+
 def atoms(formula: Formula) -> Iterator[Atom]:
     """In reading order, with repetitions."""
     if isinstance(formula, Atom):

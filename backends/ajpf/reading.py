@@ -12,15 +12,15 @@ from dataclasses import dataclass
 
 from avow.formulas.renaming import bound_names
 from avow.language.printer import show_term
-from avow.language.terms import FALSE, Quantified, Quantifier, Term, Variable
+from avow.language.terms import FALSE, TRUE, Not, Or, Quantified, Quantifier, Term, Variable
 
 from . import psl
 from .checker import Property
-from .mapping import Mapped, Mapper, NotCovered, Unit, clauses, to_formula
+from .mapping import Mapped, Mapper, NotCovered, Unit, clauses, has_output, to_formula
 from .matching import match
 from .options import Extra
 from .psl import Always, Eventually, Formula, Implies, Release
-from .shape import shape
+from .shape import conjunction, conjuncts, shape
 from .timing import Timed
 from .tuning import ALTERNATIVES
 
@@ -49,6 +49,8 @@ def read_properties(
     if left == FALSE:
         yield _eventually(psl.FALSE, psl.TRUE)
         return
+    if timing is None and not has_output(right):
+        left, right = _turned(left, right, others)
     shared = sorted({v.name for v in others} & bound_names(right))
     if shared:
         raise NotCovered(f"{shared[0]} joins what triggers the guarantee and what it demands", consequent.span)
@@ -77,6 +79,16 @@ def read_properties(
             continue
         for alternative in _alternatives(_when(condition, inputs)):
             yield _never(alternative, kept)
+
+
+def _turned(left: Term, right: Term, others: tuple[Variable, ...]) -> tuple[Term, Term]:
+    """A demand of inputs alone forbids the outputs of its trigger: ``out.spray -> in.inside`` is ``in.outside -> not
+    out.spray``. (As a trigger, the last action would meet inputs that came after it.)"""
+    acts = conjunction([part for part in conjuncts(left) if has_output(part)])
+    rest = conjunction([part for part in conjuncts(left) if not has_output(part)])
+    bound = tuple(v for v in others if v.name in bound_names(acts) - bound_names(rest))
+    done = Quantified(Quantifier.EXISTS, bound, acts) if bound else acts
+    return (left, right) if acts == TRUE else (rest, shape(Or((right, Not(done)))))
 
 
 def _when(condition: Formula, inputs: Sequence[Unit]) -> Formula:

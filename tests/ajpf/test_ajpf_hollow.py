@@ -207,11 +207,8 @@ def test_a_goal_that_its_rule_derives_of_the_trigger_shows_nothing(lift, tmp_pat
 
 # What a guarantee forbids
 
-STAYS = """
-  guarantee stays "With the door open the cabin does not move"
-    ( in.door == open -> not exists(n in NATURAL | out.motion == go(n)) )
-}
-"""
+STAYS = "in.door == open -> not exists(n in NATURAL | out.motion == go(n))"
+TURNED = "exists(n in NATURAL | out.motion == go(n)) -> not in.door == open"
 TABLE = {
     "in.call(f)": "B(cabin, call(f))",
     "in.door == shut": "B(cabin, shut)",
@@ -231,13 +228,13 @@ PROGRAM = (
 )
 
 
-@pytest.fixture
-def stays(lift, tmp_path):
+@pytest.fixture(params=[STAYS, TURNED])
+def stays(lift, tmp_path, request):
     """The outcome for a guarantee that forbids, of a cabin with these plans."""
 
-    def outcome(plans, rows=TABLE, properties=None):
+    def outcome(plans, rows=TABLE, properties=None, formula=request.param):
         contract = (lift().root / "system.rcl").read_text()
-        contract = contract[: contract.rindex("}")] + STAYS
+        contract = contract[: contract.rindex("}")] + f"guarantee stays ( {formula} )\n}}\n"
         files = {"system.rcl": contract, "cabin.gwen": PROGRAM + plans, "cabin.yaml": ONE_AT_A_TIME}
         job = lift({"predicates": dict(rows), "properties": properties, "states": 3000}, files)
         assert not [d for d in BACKEND.check(job) if d.is_error]
@@ -268,6 +265,27 @@ def test_what_comes_later_for_another_reason_does_not_refute(stays):
     assert "may have another reason than the trigger" in outcome.summary
     assert outcome.counterexample is None
     assert outcome.details["properties"][0]["answer"] == "refuted"
+
+
+GO, HALT = (f"exists(n in NATURAL | out.motion == {does}(n))" for does in ("go", "halt"))
+
+
+@pytest.mark.parametrize("stays", [STAYS], indirect=True)
+@pytest.mark.parametrize(
+    ("formula", "plans", "verdict"),
+    [
+        (
+            f"in.door == open and {HALT} -> not {GO}",
+            "+call(F) : { True } <- halt(0);\n+open : { True } <- go(1);\n",
+            "",
+        ),
+        (f"in.door == open and {HALT} -> not {GO}", "+open : { True } <- halt(0), go(1);\n", Verdict.REFUTED),
+        (f"not {HALT} -> not in.door == open", "+open : { True } <- halt(0);\n", Verdict.CHECKED),
+        (f"not {HALT} -> not in.door == open", "+open : { True } <- go(1);\n", Verdict.REFUTED),
+    ],
+)
+def test_an_action_before_the_trigger_refutes_nothing(stays, formula, plans, verdict):
+    assert stays(plans, formula=formula).verdict is (verdict or Verdict.UNKNOWN)
 
 
 WHILE_OPEN = "[] ((B(cabin, open) & D(cabin, halt(_))) -> (B(cabin, shut) R (~(B(cabin, open) & D(cabin, go(_))))))"
@@ -377,7 +395,7 @@ def test_words_that_the_agent_lacks_are_told(lift):
 
     def told(rows, environment=ONE_AT_A_TIME, stop="halt"):
         contract = (lift().root / "system.rcl").read_text()
-        contract = contract[: contract.rindex("}")] + STAYS
+        contract = contract[: contract.rindex("}")] + f"guarantee stays ( {STAYS} )\n}}\n"
         program = PROGRAM + "+call(F) : { B shut } <- go(F);\n+open : { True } <- halt(0);\n".replace("halt", stop)
         files = {"system.rcl": contract, "cabin.gwen": program, "cabin.yaml": environment}
         found = BACKEND.check(lift({"predicates": dict(rows)}, files))
