@@ -175,7 +175,7 @@ class Assumption:
         elif section == "assumption":
             where = "environment, in an entry that assumes it"
         elif "/assumption/" in self.key:
-            return f"(no plain words: {self.text})"
+            return f"(no plain words yet: {self.text})"
         else:
             where = self.key
         return f"(no plain words yet: write says: … under {where}, in plan.yaml)"

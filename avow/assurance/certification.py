@@ -109,7 +109,8 @@ def _graded(view: ObligationView, known: Reestablished | None) -> ProofView:
         return ProofView(view.id, ProofGrade.CLAIMED, tuple(sorted({f"{e.tool} {e.tool_version}" for e in own})))
     tools = {e.tool_told if e.tool_told.startswith(e.backend) else f"{e.backend}: {e.tool_told}" for e in others}
     tools |= set() if tools else {f"{r.backend}: another claim's proof" for r in view.records}
-    return ProofView(view.id, ProofGrade.TOOL_TRUSTED, tuple(sorted(tools)))
+    # commas separate the tools in a list
+    return ProofView(view.id, ProofGrade.TOOL_TRUSTED, tuple(sorted(tool.replace(", ", " with ") for tool in tools)))
 
 
 def certifiable(proofs: Iterable[ProofView]) -> tuple[ProofView, ...]:

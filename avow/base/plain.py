@@ -78,7 +78,7 @@ def one_line(text: str) -> str:
 
 def count(number: int, one: str, many: str = "") -> str:
     """``1 gate``, ``3 gates``."""
-    return f"{number:,} {one if number == 1 else many or one + 's'}".replace(",", " ")
+    return f"{number} {one if number == 1 else many or one + 's'}"
 
 
 def listed(items: Sequence[str], most: int = 8) -> str:

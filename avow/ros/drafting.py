@@ -21,6 +21,7 @@ from avow.ros.listing import Listed, Listing
 
 Path = tuple[str, ...]
 
+_LISTENS = "it only listens, and a node without outputs has no guarantee"
 _TOOLS = {
     r"/(rosout|record_\d+|rosbag2?_.*|play_\d+)": "records, plays or logs",
     r"/(rqt_.*|rviz2?(_.*)?|_ros2cli.*|rostopic_.*|foxglove_bridge.*)": "shows what others publish",
@@ -171,10 +172,16 @@ class _Draft:
         dropped: dict[str, str] = {}
         for node in self.given.listing.nodes:
             why = next((why for form, why in _TOOLS.items() if re.fullmatch(form, node.name)), None)
+            answers = (*node.serves, *node.calls, *node.does, *node.orders)
+            if why is None and node.subscribes and not answers and all(map(is_plumbing, node.publishes)):
+                why = _LISTENS
             if why is None:
                 kept.append(node)
             else:
                 dropped[node.name] = why
+        if not kept:
+            kept = [node for node in self.given.listing.nodes if dropped.get(node.name) == _LISTENS]
+        dropped = {name: why for name, why in dropped.items() if all(node.name != name for node in kept)}
         short = _short([node.name for node in kept], self.given.keywords)
         return {short[node.name]: node for node in kept}, dropped
 

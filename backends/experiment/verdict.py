@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
+from decimal import ROUND_CEILING, Context, Decimal
 from fractions import Fraction
 from typing import Any
 
@@ -199,7 +200,7 @@ def _unmet(claim: Claim, found: Sequence[tuple[Run, Judged]]) -> str:
 def _seen(sample: _Sample, runs: int) -> str:
     """``17 triggered runs of 105, 0 failed``."""
     triggered = count(sample.triggered, "triggered run")
-    of = count(runs, "run") if sample.triggered == runs else f"{triggered} of {runs:,}".replace(",", " ")
+    of = count(runs, "run") if sample.triggered == runs else f"{triggered} of {runs}"
     excused = f" ({sample.excused} broke an assumption)" if sample.excused else ""
     return f"{of}{excused}, {len(sample.failed)} failed"
 
@@ -324,5 +325,6 @@ def _percent(value: Fraction) -> str:
 
 
 def _percent_up(value: Fraction) -> str:
-    """One decimal, never rounded down."""
-    return f"{float(Fraction(-(-value * 1000 // 1), 10)):g} %"
+    """Three digits, never rounded down, as the rate of a requirement has them."""
+    up = Context(prec=3, rounding=ROUND_CEILING)
+    return f"{up.divide(Decimal(100 * value.numerator), Decimal(value.denominator)).normalize():f} %"

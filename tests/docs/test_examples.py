@@ -67,6 +67,8 @@ def test_the_examples_verify(tmp_path: Path) -> None:
         verdict = VERDICTS[name]
         case = json.loads((place / "reports" / name / "report.json").read_text())
         assert case["answers"]["verdict"] == verdict, name
+        checked = avow("report", "--check", name, cwd=place)
+        assert checked.returncode == 0, checked.stdout
         if shutil.which("chromium"):
             report = place / "reports" / name
             assert departures(read_case(report), (report / "index.html").read_text(), tmp_path) == [], name

@@ -121,7 +121,6 @@ def test_the_page_on_an_own_ros2_robot_runs(tmp_path: Path) -> None:
         "lifter.weak": "refuted" if clang().present else "unwritten",
         "scanner.to_write": "unwritten",
         "speed_limiter.near": "tested",
-        "wheels.to_write": "unwritten",
     }
     near = found["speed_limiter.near"]["evidence"]
     assert {item["entry"]["evidence"]["verdict"] for item in near if item["counts"]} == {"tested", "monitored"}

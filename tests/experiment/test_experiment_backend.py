@@ -171,7 +171,7 @@ def test_a_confidence_is_never_said_to_be_more_than_it_is(tmp_path: Path) -> Non
 
 def test_yes_and_no_trials_count_each(tmp_path: Path) -> None:
     outcome = settle(job(tmp_path, "out.detected", rows("found", *["yes"] * 47), mapping={"out.detected": "found"}))
-    assert outcome.summary == "47 runs, 0 failed: at most 6.2 % fail at 95 % confidence"
+    assert outcome.summary == "47 runs, 0 failed: at most 6.18 % fail at 95 % confidence"
 
 
 def test_a_column_of_noise_changes_nothing(tmp_path: Path) -> None:
