@@ -11,8 +11,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
 
+from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.plain import decimal, listed
 from avow.formulas.formula import conjunction, substitute
+from avow.formulas.temporal.responses import responding
 from avow.kernel.rates import Likely, Trial, together
 from avow.language.contract import Clause
 from avow.language.subterms import ports_of
@@ -47,6 +49,10 @@ def while_kept(system: System, requirement: Requirement, formula: Term) -> Term:
     at which no guarantee with a probability fails."""
     if requirement.probability is None:
         return formula
+    if responding(formula) is not None:
+        message = f"{requirement.id}: a response to come has no probability: it may be due at a later step"
+        hint = "ask for a formula about this step and earlier ones"
+        raise Rejected(Diagnostic("PLAN142", message, requirement.formula_span, hint=hint))
     given = condition(system, requirement.probability)
     parts = [*kept(system, requirement).values(), *([given] if given is not None else [])]
     return Implies(conjunction(parts), formula) if parts else formula

@@ -19,7 +19,7 @@ from avow.evidence.record import COMPOSES, LIKELY_LEAVES
 from avow.formulas.formula import digest
 from avow.kernel.check import Refused
 from avow.system.plan import Requirement
-from avow.system.temporal import written_state
+from avow.system.temporal import parse_state
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,7 +103,9 @@ def requirement_question(
             return question
         system = frame.system
         goal = chance.while_kept(
-            system, replace(requirement, supported_by=()), written_state(requirement.formula, system.contract)
+            system,
+            replace(requirement, supported_by=()),
+            parse_state(requirement.formula, system.contract, requirement.formula_span),
         )
         found = chance.likely(system, requirement)
         return LikelyQuestion(requirement, replace(question, spoken=goal, likely=found))

@@ -135,6 +135,9 @@ class _Reader:
         claims = self._claims(bindings, meanings)
         self._outside()
         named = [column for binding in bindings for column in binding.columns]
+        for unused in [name for name in self.options.get("network", {}).get("outputs", {}) if name not in named]:
+            message = f"no port is read from '{unused}', an output of the network: the evidence would not be of it"
+            self.add("network", message, f"mapping: {{out.PORT: {unused}}}, or leave this output out", "EXP103")
         runs = self._runs(table, named, bindings := self._read(bindings, claims))
         return self.claimed(runs, claims, tuple(bindings))
 

@@ -40,7 +40,7 @@ NAMED = {"sees": "eye.sees", "knows": "eye.knows", "lasts": "eye.lasts"}
 
 def made(folder: Path, formula: str, asked: str, *support: str) -> System:
     names = ", ".join(NAMED.get(name, name) for name in (*support, "brake.stops"))
-    plan = f"R: {{text: It stops, formula: {formula}, probability: {asked}, supported_by: [{names}]}}"
+    plan = f"R: {{text: It stops, formula: '{formula}', probability: {asked}, supported_by: [{names}]}}"
     return make(folder, RCL, f"requirements: {{{plan}}}{REST}")
 
 
@@ -114,6 +114,14 @@ compose: {whole: {persistence: &said {because: latched}, one_output: *said}}
 requirements: {R: {text: t, formula: brake.last, probability: 0.9, supported_by: [eye.sees, brake.is]}}
 """
     assert outcomes(make(tmp_path, rcl, plan))["R"].verdict is Verdict.UNKNOWN
+
+
+def test_a_formula_may_look_back_but_not_ahead(tmp_path: Path) -> None:
+    back = answer(tmp_path / "back", "historically(eye.dark) and eye.near -> brake.stop", "0.99", "sees")
+    assert back.verdict is Verdict.PROVED, back.summary
+    with pytest.raises(Rejected) as found:
+        compose(made(tmp_path / "ahead", "eye.near -> within[2 steps](brake.stop)", "0.99", "sees"))
+    assert [d.code for d in found.value.diagnostics] == ["PLAN142"]
 
 
 def test_it_discharges_no_assumption(tmp_path: Path) -> None:

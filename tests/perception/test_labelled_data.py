@@ -78,6 +78,7 @@ def test_the_network_decides(tmp_path: Path) -> None:
         ({"outputs": {"f": {"index": 7, "threshold": 4}, "s": 0, "k": 1}}, "n.onnx has 3 outputs, from 0 to 2"),
         ({"inputs": ["size", "lihgt"]}, "there is no column 'lihgt'"),
         ({"outputs": {"size": 0}}, "the column 'size' is that of an output of the network, too"),
+        ({"outputs": {**OPTIONS["network"]["outputs"], "z": 1}}, "no port is read from 'z', an output of the network"),  # type: ignore[index]
         ({"file": "m.onnx"}, "m.onnx"),
     ],
 )
