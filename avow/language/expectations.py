@@ -63,6 +63,7 @@ def explain(
     if found.type == "$END" and tokens:
         last = tokens[-1]
         message = f"{_expected(start, expected)} is missing after `{last.text[:40]}`"
+        hint = "remove the `,`, or go on after it" if last.type == "COMMA" else hint
         reports.error("RCL120", message, last.start, last.end, hint=hint)
         return
     if start in ("ports", "given") and found.type == "COLON" and at > 2 and tokens[at - 2].end < tokens[at - 1].start:

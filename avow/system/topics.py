@@ -166,11 +166,16 @@ def turned(plan: Plan, contract: Contract) -> Iterator[Diagnostic]:
     """Remappings of a topic that the node does not have to one that it has: probably written the wrong way round."""
     for node in contract.nodes:
         placed = plan.ros.names.placed(node.name)
-        if placed.launched:
-            continue  # a contract drafted from a running system has the names that topics have then
         own = {placed.expanded(topic.name): topic.name for topic in node.topics}
         for old, new in placed.remaps:
             meant = own.get(placed.expanded(new))
+            if placed.launched:  # a contract drafted from a running system has the names that topics have then
+                near = nearest(placed.expanded(new), own) if meant is None and placed.expanded(old) not in own else []
+                if near:
+                    message = f"{node.name} is started with {old} remapped to {new}, and has no topic of either name"
+                    hint = f"did you mean `{near[0]}`?"
+                    yield Diagnostic("ROS116", message, placed.span, Severity.WARNING, hint)
+                continue
             if meant is not None and placed.expanded(old) not in own:
                 message = f"{node.name} is started with {old}:={new}, and has no topic {old}, but {meant}"
                 hint = f"a remapping says the node's own name first: {{{meant}: {old}}}"

@@ -311,6 +311,10 @@ def test_a_contract_drafted_of_what_runs_has_the_names_after_remapping(tmp_path:
     folder = make(tmp_path, LAUNCH, contract=contract)
     assert edges(folder) == ["a.x → b.y /left/t"]
     assert [d.code for d in diagnostics(load_system(folder)) if d.code == "ROS116"] == []
+    misspelt = make(tmp_path / "misspelt", LAUNCH, contract=contract.replace("/left/t ", "/left/tt "))
+    found = [d for d in diagnostics(load_system(misspelt)) if d.code == "ROS116"]
+    assert found, "the remapping touches no topic"
+    assert all(d.span and "launch" in d.span.file for d in found)
 
 
 def test_memory_needs_no_topic(tmp_path: Path) -> None:
