@@ -145,6 +145,8 @@ def _moved(
     if about == "file":
         return
     names = [name for name in dict.fromkeys((*was, *now)) if was.get(name, ()) != now.get(name, ())]
+    if "level" in names:  # its line says more
+        names = [name for name in names if name != "weakest evidence"]
     kinds = {name: _kind(about, name, was.get(name, ()), now.get(name, ())) for name in names}
     if about == "evidence":  # one line for all
         kind = min(kinds.values(), key=KINDS.index)
@@ -221,6 +223,9 @@ def _kind(about: str, name: str, was: Value, now: Value) -> str:
             return "demand"
         case "requirement", "failure rate":
             return "better" if _number(after, 1) < _number(before, 1) else "weaker"
+        case "requirement", "weakest evidence":  # `bound 13 %`, `no bound`; nothing for a proof
+            now_at, was_at = (_number(text[6:-2], 101 if text else 0) for text in (after, before))
+            return "better" if now_at < was_at else "weaker"
         case "evidence", "bound":
             return "better" if _number(after, 1) < _number(before, 1) else "weaker"
         case "evidence", "judged":

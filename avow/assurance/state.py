@@ -137,6 +137,7 @@ def _items(case: Case) -> Iterator[tuple[tuple[str, str], Mapping[str, Value]]]:
                 "probability": (r.probability.words if r.probability else "",),
                 "supported by": r.supported_by,
                 "failure rate": (r.rate.bound if r.rate else "",),
+                "weakest evidence": (r.weakest_evidence.bound if r.weakest_evidence else "",),
                 "search": (r.searched,),
                 "source": (r.source,),
             },

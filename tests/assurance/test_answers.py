@@ -38,13 +38,13 @@ from avow.assurance.answers import (
     Tone,
 )
 from avow.assurance.case import as_of, conclude_again
-from avow.assurance.changes import KINDS, _edit
+from avow.assurance.changes import KINDS, _edit, compare
 from avow.assurance.deficits import _WORDS
 from avow.assurance.deficits import words_of as deficit_words
 from avow.assurance.first_screen import _lines, _owners
 from avow.assurance.model import Case
 from avow.assurance.relied import relied_of, weakness
-from avow.assurance.state import baseline_of
+from avow.assurance.state import baseline_of, state_of
 from avow.base.plain import identifiers, words_of
 from avow.base.verdict import Hypothesis, HypothesisKind, Link, Object, Verdict, bound
 from avow.evidence.obligation import SYSTEM_LEVEL, Kind, Obligation
@@ -721,3 +721,19 @@ def test_hazards_and_gates_that_changed_since_the_signature_have_a_line_each() -
     assert ("demand", "hazard H1, severity: critical → marginal") in found
     assert ("gone", "hazard H2 is not there any more") in found
     assert any(kind == "demand" and words.endswith("passes → does not apply any more") for kind, words in found)
+
+
+def test_a_weaker_bound_of_a_requirement_is_a_change() -> None:
+    node, asked = [guarantee("a", "g")], [replace(PROSE, id="R", supported_by=("a.g",))]
+
+    def drawn(below: float) -> Case:
+        bound = {"cases": 20, "failure_probability_below": below, "confidence": 0.95}
+        made = [evidence(node[0], Verdict.TESTED, "hypothesis", bound=bound)]
+        return case(system({"a": ["g"]}, requirements=asked), node, made)
+
+    states = {below: state_of(drawn(below)) for below in (0.13, 0.78)}
+    for (was, now), kind in (((0.13, 0.78), "weaker"), ((0.78, 0.13), "better")):
+        found = [c for c in compare(states[was], states[now]) if c.about == "requirement"]
+        assert [(c.kind, c.before, c.after) for c in found] == [
+            (kind, f"bound {was * 100:g} %", f"bound {now * 100:g} %")
+        ]
