@@ -123,8 +123,8 @@ def answers(
     by_level = tuple((level, number[level]) for level in _WORST_FIRST if number[level])
     asked = [gate for gate in gates if not gate.idle]
     good = sum(gate.passed for gate in asked)
-    relaxed = [gate.title for gate in asked if gate.relaxed]
-    idle = f", {len(relaxed)} relaxed by the plan" if relaxed else ""
+    relaxed = sum(gate.relaxed for gate in asked)
+    idle = f", {relaxed} relaxed by the plan" if relaxed else ""
     idle += f", {off} do{'es' * (off == 1)} not apply" if (off := len(gates) - len(asked)) else ""
     kinds = len(deficits)
     by_node: dict[str, list[ObligationView]] = {node.name: [] for node in nodes}

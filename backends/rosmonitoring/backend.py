@@ -88,11 +88,11 @@ class RosMonitoringBackend(Backend):
                 severity = Severity.WARNING if digest else Severity.ERROR
                 problems.append(Diagnostic("MON102", message, span, severity, hint))
             elif digest and path.exists() and (there := digest_trace(path)) != digest:
-                message = f"traces: {name!r} is not the recording that the plan names: its digest is {there}"
-                empty = path.is_dir() and not any(each.is_file() for each in path.rglob("*"))
-                hint = "put the recording there, or write this digest if it is the one that is meant"
-                if empty:
+                if path.is_dir() and not any(each.is_file() for each in path.rglob("*")):
                     message, hint = f"traces: {name!r} is an empty folder", "put the recording there"
+                else:
+                    message = f"traces: {name!r} is not the recording that the plan names: its digest is {there}"
+                    hint = "put the recording there, or write this digest if it is the one that is meant"
                 problems.append(Diagnostic("MON102", message, span, hint=hint))
             elif not faults:
                 other = readable(found, path, origin(job.system))
