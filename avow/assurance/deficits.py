@@ -109,7 +109,7 @@ def deficits(
         "wordless": [s.key for s in assumptions if not s.says],
         "bare": [s.key for s in assumptions if not s.reasoned],
         "sampled": [v.id for v in views if _status(v, relied) in (Status.TESTED, Status.MONITORED)],
-        "unanswered": [v.id for v in leaves if any(e.entry.evidence.bound.get("unanswered") for e in v.counting)],
+        "unanswered": [v.id for v in leaves if any(_silences(e.entry.evidence.bound) for e in v.counting)],
         "nan": [v.id for v in leaves if any(e.entry.evidence.details.get("no numbers") for e in v.counting)],
         "read": [v.id for v in guarantees if _status(v, relied) is Status.REVIEWED],
         "single": list(single),
@@ -163,6 +163,11 @@ def _by_hand(view: ObligationView, relied: Relied) -> bool:
     sure = relied.status in EXHAUSTIVE
     alike = [r for r in view.records if weigh(r).support is relied.status or (sure and weigh(r).support in EXHAUSTIVE)]
     return relied.status is not Status.REVIEWED and all(record.link is not Link.GENERATED for record in alike)
+
+
+def _silences(bound: Mapping[str, object]) -> bool:
+    """Whether an input had no answer, or none before the end of a trace."""
+    return bool(bound.get("unanswered") or bound.get("open"))
 
 
 def _unanswered_share(view: ObligationView) -> int:

@@ -148,7 +148,9 @@ class Facts:
             "bare": sum(_words(f"{a['because']} {a['text']}") <= _words(a["says"]) for a in self.assumptions),
             "wordless": sum(not a["says"] for a in self.assumptions),
             "unowned": len(self.assumptions) - len(self.owned_ones()),
-            "unanswered": sum(any(r["bound"].get("unanswered") for r in records(v)) for v in (*within, *own)),
+            "unanswered": sum(
+                any(r["bound"].get("unanswered") or r["bound"].get("open") for r in records(v)) for v in (*within, *own)
+            ),
             "nan": sum(any(r["details"].get("no numbers") for r in records(v)) for v in (*within, *own)),
             "withdrawn": sum(i["kind"] == "withdrawn" for i in self.case["open_items"]),
             "idle": sum(

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import csv
 import io
+import os
 import shutil
 import tempfile
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -20,14 +21,16 @@ from avow.backend_kit.registry import judge_of_runs
 from avow.base import process
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.files import write
+from avow.base.plain import listed
 from avow.base.records import dataclass
 from avow.base.verdict import Verdict
+from avow.isolation.tracing import Trace, traces
 from avow.language.terms import TRUE
 from avow.ros.bags import digest_trace
 
 from . import options
 from .judging import Claim, Judged
-from .profile import Campaign, Run
+from .profile import Campaign, Run, command_files
 from .table import Table, read_table
 
 OK = "ok"
@@ -115,7 +118,13 @@ def perform(job: Job, campaign: Campaign, run: Run, seconds: float) -> tuple[Row
     remove(place)
     with tempfile.TemporaryDirectory(prefix="avow-campaign-") as made:
         trace = Path(made) / campaign.trace
-        done = process.run(campaign.words(run, str(trace)), cwd=job.root, seconds=seconds)
+        words, watching = campaign.words(run, str(trace)), Trace() if traces() else None
+        program = str(job.root / words[0]) if os.sep in words[0] else shutil.which(words[0])
+        if watching is None or program is None:
+            done = process.run(words, cwd=job.root, seconds=seconds)
+        else:
+            done = process.run(watching.around([program, *words[1:]]), cwd=job.root, seconds=seconds)
+            _all_named(job, watching.read_all(program, job.root) or ())
         told = (done.stderr.strip() or done.stdout.strip()).rpartition("\n")[2]
         if done.code != 0:
             how = f"timed out after {seconds:g} s" if done.timed_out else f"exit code {done.code}"
@@ -124,6 +133,17 @@ def perform(job: Job, campaign: Campaign, run: Run, seconds: float) -> tuple[Row
             return Row(run, "no recording", campaign.made_by), told
         shutil.move(trace, place)
     return Row(run, OK, campaign.made_by, digest_trace(place)), ""
+
+
+def _all_named(job: Job, events: Iterable[tuple[str, str]]) -> None:
+    """Raises Rejected if the simulator read a file of the system's folder whose change would make no run stale."""
+    root, known = job.root.resolve(), set(command_files(job))
+    read = {Path(os.path.realpath(path)) for event, path in events if event == "read"}
+    unnamed = [p.relative_to(root).as_posix() for p in sorted(read - known) if root in p.parents and p.is_file()]
+    if left := [name for name in unnamed if "__pycache__" not in name]:
+        message = f"the simulator reads {listed(left)}, which the plan does not name"
+        hint = f"add `files: [{', '.join(left)}]`, so that the runs no longer count when it changes"
+        raise Rejected(Diagnostic("EXP107", message, job.method.options.at("campaign"), hint=hint))
 
 
 def remove(path: Path) -> None:
@@ -230,7 +250,9 @@ def experiment(job: Job, made: Sequence[Made], again: Sequence[Made]) -> options
         )
 
     claims = {o.name: _claim(job, o.name, made) for o in job.obligations}
-    return options.limits(job, runs(made), claims, runs(again))
+    recordings = [one.row.sha256 for one in made if one.row.ended == OK]
+    alike = len(recordings) - len(set(recordings))
+    return replace(options.limits(job, runs(made), claims, runs(again)), alike=alike)
 
 
 def _claim(job: Job, name: str, made: Sequence[Made]) -> Claim:

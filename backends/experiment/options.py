@@ -67,6 +67,8 @@ class Experiment:
     because: str = ""
     replayed: tuple[Run, ...] | None = None
     """The regressions of a campaign; None if there is no campaign."""
+    alike: int = 0
+    """The runs of a campaign whose recording equals that of an earlier one."""
 
     def values(self, rows: Iterable[Mapping[str, str]]) -> tuple[Step, ...]:
         """Raises Unfit, and KeyError if a cell is missing."""

@@ -66,14 +66,15 @@ def _outcome(claim: Claim, found: Sequence[tuple[Run, Judged]], experiment: Expe
     if sample.excused:
         bound["runs that break an assumption"] = sample.excused
     if unfinished := [run.name for run, one in found if one.open]:
-        bound["runs that end before an answer is due"] = len(unfinished)
+        bound["runs that end before an answer"] = len(unfinished)
     outcome = Outcome("", Verdict.UNKNOWN, "", bound=bound, details=details)
     details["strata"] = [_row(stratum) for stratum in sample.strata]
     bound["triggered"], bound["failures"] = sample.triggered, len(sample.failed)
     if len(sample.strata) > 1:
         bound["worst stratum"] = f"{sample.worst.name}, {sample.worst.failures} of {sample.worst.trials} failed"
     bound["failure probability at most"] = float(sample.bound)
-    seen = _seen(sample, len(found))
+    alike = f"{count(experiment.alike, 'recording')} like an earlier one" if experiment.alike else ""
+    seen = _seen(sample, len(found), alike)
     text = f"{seen}: {_most(sample, experiment)}"
     at_least, chance = experiment.at_least, claim.chance
     if chance is not None:
@@ -95,9 +96,11 @@ def _outcome(claim: Claim, found: Sequence[tuple[Run, Judged]], experiment: Expe
     rests = [_DRAWN if experiment.replayed is None else _SIMULATED, *claim.interpreted]
     if claim.unseen:
         rests.append(f"each run meets the assumptions {', '.join(claim.unseen)}: their inputs are not in the data")
+    if alike:
+        rests.append(f"the simulator uses seed and scenario, although it made {alike}")
     if unfinished:
         names = listed(unfinished, FAILURES_SHOWN)
-        rests.append(f"no answer would be late in runs that end before one is due: {names}")
+        rests.append(f"an answer would be in time and right in runs that end before it: {names}")
     if sample.failed:
         details["failing runs"] = counterexample(claim, sample.failed).explanation
         if chance is None:
@@ -197,12 +200,12 @@ def _unmet(claim: Claim, found: Sequence[tuple[Run, Judged]]) -> str:
     return f"in none of {runs} was its condition met: {unmet[0]}" if unmet else ""
 
 
-def _seen(sample: _Sample, runs: int) -> str:
-    """``17 triggered runs of 105, 0 failed``."""
+def _seen(sample: _Sample, runs: int, alike: str) -> str:
+    """``17 triggered runs of 105 (3 recordings like an earlier one), 0 failed``."""
     triggered = count(sample.triggered, "triggered run")
     of = count(runs, "run") if sample.triggered == runs else f"{triggered} of {runs}"
-    excused = f" ({sample.excused} broke an assumption)" if sample.excused else ""
-    return f"{of}{excused}, {len(sample.failed)} failed"
+    aside = ", ".join(filter(None, (f"{sample.excused} broke an assumption" if sample.excused else "", alike)))
+    return f"{of}{f' ({aside})' if aside else ''}, {len(sample.failed)} failed"
 
 
 def _most(sample: _Sample, experiment: Experiment) -> str:
@@ -248,7 +251,7 @@ def _word(claim: Claim, one: Judged) -> str:
     if one.undecided:
         return "undecided"
     if one.open:
-        return "ends before an answer is due"
+        return "ends before an answer"
     return "ok" if (one.met if claim.conditions else one.asked) else "not triggered"
 
 

@@ -376,7 +376,8 @@ class Monitor:
             follow(self, self.word.finish(uneven=bool(why)), found)
         for watched in self.about(self.clauses):
             answers.finish(self, watched, found)
-            watched.tally.open += watched.steps is not None and watched.steps.open
+            watched.tally.left = self._left(watched)
+            watched.tally.open += bool(watched.tally.left) if watched.steps is None else watched.steps.open
             if any(of not in self.at for name in watched.names if (of := heard_through(self.setup.rules[name]))):
                 watched.only_supposed()
             if watched in self._timed and (why := self.timing.standing):
@@ -384,6 +385,14 @@ class Monitor:
         found = answers.sure(self, found, over=True)
         found, self.in_doubt = [*self.in_doubt, *found], []
         return answers.withdraw(self, found) if self.backwards else found
+
+    def _left(self, watched: Watched) -> int:
+        """A bit for each condition that the latest inputs meet, if one of them came after the latest answer."""
+        said = max((self.at[name][0] for name in watched.outputs if name in self.at), default=0)
+        later = any(self.at[name][0] > said for name in watched.inputs if name in self.at)
+        if not (later and watched.outputs and watched.steps is None):
+            return 0
+        return watched.met({n: value for n, value in self.values.items() if n not in watched.outputs})
 
     def settle(self, now: Ticks | None, found: list[Violation]) -> None:
         """Judge the answers whose inputs are known at a time (None: the run is over)."""

@@ -205,6 +205,9 @@ def judge(job: Job) -> Callable[[Iterable[Mapping[str, Any]] | Path], JudgedRun]
     return run
 
 
+_SILENT = "the last inputs met a condition and had no answer: let the run go on until the node has answered"
+
+
 def _of_recording(job: Job, found: Setup, name: str) -> JudgedRun:
     """Each guarantee as if the recording were its only evidence."""
     monitor, distances = ReportingMonitor(found, [o.name for o in job.obligations]), dict[str, float]()
@@ -220,9 +223,10 @@ def _of_recording(job: Job, found: Setup, name: str) -> JudgedRun:
         shown = Shown(o.name, [run], _spoken(job, o), excuse)
         answer, tally, distance = outcome(o.id, shown), monitor.tallies[o.name], distances.get(o.name)
         broken, held = answer.verdict is Verdict.REFUTED, answer.verdict is Verdict.MONITORED
+        silent = not broken and bool(tally.left & ~tally.met)
         clauses[o.name] = Judged(
-            shown.decided - tally.broken, int(broken), tally.excused, int(not broken and not held), _met(tally),
-            answer.counterexample, 0, answer.summary, tally.open > 0, distance,
+            shown.decided - tally.broken, int(broken), tally.excused, int(silent or not (broken or held)), _met(tally),
+            answer.counterexample, 0, _SILENT if silent else answer.summary, tally.open > 0, distance,
         )  # fmt: skip
     broke = next((v for v in run.first.values() if _breaks(found, v)), None)
     unseen = tuple(c.name for c in job.node.assumptions if not monitor.tallies[c.name].judged)

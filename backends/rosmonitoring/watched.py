@@ -55,7 +55,9 @@ class Tally:
     overdue: int = 0
     """Steps at which a response that had missed its deadline was still missing: no further breaches."""
     open: int = 0
-    """Runs at whose end a response was still required, or may have been."""
+    """Runs at whose end a response was still required, or may have been, or the latest inputs had no answer yet."""
+    left: int = 0
+    """A bit for each condition that these inputs meet."""
     unanswered: int = 0
     """Inputs without an answer, although later ones had one."""
     published: int = 0
@@ -141,7 +143,7 @@ def coverage(tally: Tally) -> str:
     ]
     told = ", ".join(words.format(count) for count, words in parts if count)
     told += f"; {old(tally.ages)}" if tally.ages else ""
-    told += f"{'; ' if told else ''}a response was open at the end" if tally.open else ""
+    told += f"{'; ' if told else ''}an answer was open at the end" if tally.open else ""
     return f"published {tally.published} times" + (f": {told}" if told else "")
 
 

@@ -18,6 +18,7 @@ from avow.backends.experiment import BACKEND
 from avow.backends.experiment.profile import read_campaign
 from avow.backends.experiment.searching import Cells, Searched, Tried, search
 from avow.base.verdict import Object, Outcome, Verdict
+from avow.isolation.tracing import traces
 from avow.pipeline.methods import method_job
 from avow.pipeline.work import method_work
 from avow.system.load import load_system
@@ -195,6 +196,42 @@ def test_a_run_that_nobody_can_judge_ends_the_campaign_and_the_search(tmp_path: 
     assert len((root / "data/runs.csv").read_text().splitlines()) == 2
     assert settle(root).verdict is Verdict.UNKNOWN
     assert "run 1 of the search failed" in campaign(root, "--search", code=1)
+
+
+DIES = 'print(json.dumps({"topic": topic, "time": n, "data": value}), file=file)\n'
+
+
+@pytest.mark.parametrize("early", [0.5, 2])
+def test_a_node_that_dies_before_it_answers_a_condition_is_no_run_without_a_trial(early: float, tmp_path: Path) -> None:
+    """An answer to an earlier input hides it only if that input met the condition, too."""
+    root = made(tmp_path)
+    edit(root / "world.py", ('[("speed", speed)', f'[("speed", {early}), ("distance", 0), ("speed", speed)'))
+    edit(root / "world.py", (DIES, f"n == 3 and grip < 0.5 and sys.exit()\n        {DIES}"))
+    said = campaign(root, code=1 if early < 1 else 0)
+    assert ("undecided: the last inputs met a condition and had no answer" in said) is (early < 1)
+    outcome = settle(root)
+    assert outcome.verdict is (Verdict.UNKNOWN if early < 1 else Verdict.TESTED)
+    assert any("in runs that end before it" in text for text in outcome.hypotheses) is (early > 1)
+
+
+def test_equal_recordings_rest_on_an_assumption(tmp_path: Path) -> None:
+    root = made(tmp_path)
+    edit(root / "world.py", ("float(sys.argv[2])", "2"))
+    assert "14 runs (13 recordings like an earlier one), 0 failed" in campaign(root)
+    assert any("uses seed and scenario" in text for text in settle(root).hypotheses)
+
+
+@pytest.mark.skipif(not traces(), reason="strace does not work here")
+def test_a_file_that_the_simulator_reads_has_to_be_named(tmp_path: Path) -> None:
+    root = made(tmp_path)
+    (root / "grip.json").write_text("0.5")
+    edit(root / "world.py", ("speed * 0.5", 'speed * json.load(open("grip.json"))'))
+    assert "error[EXP107]: the simulator reads grip.json, which the plan does not name" in campaign(root, code=2)
+    assert not (root / "data/runs.csv").exists()
+    edit(root / "plan.yaml", ("runs: 20", "runs: 20\n            files: [grip.json]"))
+    campaign(root)
+    (root / "grip.json").write_text("0.4")
+    assert settle(root).verdict is Verdict.UNKNOWN
 
 
 def test_a_run_that_breaks_an_assumption_is_no_trial(tmp_path: Path) -> None:

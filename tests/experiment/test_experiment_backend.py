@@ -317,8 +317,8 @@ def test_a_run_that_ends_before_its_answer_is_due_is_no_trial_and_named(tmp_path
     some = runs_of(*["10 00 01 00"] * 20, "10 00", "10 01", "10 00 01 10")
     told = settle(job(tmp_path / "some", WITHIN, some, steps=True, **DETECTION))
     assert told.summary.startswith("21 triggered runs of 23, 0 failed")
-    assert told.bound["runs that end before an answer is due"] == 2
-    assert "no answer would be late in runs that end before one is due: 20, 22" in told.hypotheses
+    assert told.bound["runs that end before an answer"] == 2
+    assert "an answer would be in time and right in runs that end before it: 20, 22" in told.hypotheses
     outcome = settle(job(tmp_path, WITHIN, runs_of(*["10 00"] * 30), steps=True, **DETECTION))
     assert outcome.vacuous
     assert outcome.summary.endswith("in.person → within[2 steps](out.detected) is due before the run ends")

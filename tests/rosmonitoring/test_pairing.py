@@ -379,6 +379,21 @@ def test_inputs_without_an_answer_are_counted(
         assert ("inputs without an answer" in found.summary) is bool(missing)
 
 
+@pytest.mark.parametrize(("last", "answered", "open_"), [(12, False, 1), (12, True, 0), (1, False, 0)])
+def test_by_arrival_a_trace_that_ends_with_an_unanswered_condition_is_open(
+    last: int, answered: bool, open_: int, make_system: Callable[..., System]
+) -> None:
+    events: list[Event] = [
+        {"topic": "r", "time": 0, "value": 12},
+        {"topic": "s", "time": 1, "level": "high"},
+        *({"topic": "r", "time": 2 + k, "value": last} for k in range(3)),
+        *([{"topic": "s", "time": 9, "level": "high"}] if answered else ()),
+    ]
+    violations, tallies = judge(make_system(RCL, MAPPING, answers={"by": "arrival", "because": "one process"}), events)
+    assert violations == []
+    assert tallies["high"].open == open_
+
+
 def test_an_input_that_breaks_an_assumption_needs_no_answer(make_system: Callable[..., System]) -> None:
     events: list[Event] = [{"topic": "r", "time": k, "value": r, "id": k} for k, r in enumerate((1, -1, 1))]
     events.append({"topic": "s", "time": 9, "level": "low", "id": 2})
