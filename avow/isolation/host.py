@@ -228,6 +228,20 @@ def _found_before() -> list[tuple[str, str]]:
     return [*read, *(("list", folder) for folder in first)]
 
 
+def _hide(folders: list[str]) -> list[tuple[str, str]]:
+    """Forget the imported modules that a file of these folders replaces when the program is run from there, as it has
+    then to find that file; returns where it was looked for."""
+    for name, module in list(sys.modules.items()):
+        origin = getattr(getattr(module, "__spec__", None), "origin", None)
+        if "." in name or origin in ("built-in", "frozen"):  # found before any folder is searched
+            continue
+        paths = [os.path.join(folder, name) for folder in folders]  # noqa: PTH118
+        if any(os.path.isfile(f"{path}.py") or os.path.isfile(f"{path}/__init__.py") for path in paths):  # noqa: PTH113
+            for known in [each for each in sys.modules if each == name or each.startswith(f"{name}.")]:
+                del sys.modules[known]
+    return [("list", folder) for folder in folders]
+
+
 def _folders_only() -> list[tuple[str, str]]:
     """Namespace packages: a file ``__init__.py`` that appears there would be imported."""
     found = (module for module in list(sys.modules.values()) if getattr(module, "__file__", None) is None)
@@ -289,7 +303,7 @@ def main() -> None:
         drive = driving(function, folders)
         _read_sources_only(os.path.realpath(root))
         seen = _beside("watching.py", "avow_watching").watch(tempfile.gettempdir())
-        before = [*_found_before(), *looked]
+        before = [*_found_before(), *looked, *_hide(folders)]
         sys.path[:0] = folders
 
         def say(message: dict[str, Any], earlier: list[tuple[str, str]] = before[:0]) -> None:

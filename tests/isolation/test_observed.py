@@ -13,7 +13,7 @@ from avow.base.workspace import Workspace
 from avow.evidence.currency import as_of_now
 from avow.evidence.ledger import ledger_of
 from avow.isolation.level import SANDBOX, seals
-from avow.isolation.observed import Seen
+from avow.isolation.observed import Observed, Seen, look
 from avow.isolation.subject import SubjectProcess
 from avow.pipeline.discharge import discharge, open_obligations
 from avow.pipeline.run_info import Run
@@ -262,6 +262,23 @@ def outside(folder: Path, text: str) -> list[str]:
     assert subject.ask({}) == {"i": "10"}
     assert not subject.close()
     return [o.path for o in subject.observed() if o.kind is Seen.OUTSIDE]
+
+
+@pytest.mark.parametrize("name", ["json", "fractions", "signal"])
+@pytest.mark.parametrize("file", ["{}.py", "{}/__init__.py"])
+def test_a_module_beside_the_program_replaces_pythons_own(name: str, file: str, tmp_path: Path) -> None:
+    (tmp_path / "m.py").write_text(f"import {name}\ndef step(): return getattr({name}, 'OWN', 0)\n")
+
+    def asked() -> tuple[object, tuple[Observed, ...]]:
+        subject = SubjectProcess(tmp_path / "m.py", "step", 10.0)
+        return subject.ask({}), subject.observed()
+
+    found, before = asked()
+    assert found == {"i": "0"}
+    (tmp_path / file.format(name)).parent.mkdir(exist_ok=True)
+    (tmp_path / file.format(name)).write_text("OWN = 1\n")
+    assert [one for one in before if look(one.kind, one.path) != one.digest]  # the folder's listing
+    assert asked()[0] == {"i": "1"}
 
 
 @pytest.mark.slow
