@@ -123,6 +123,8 @@ def _shallow(read: Callable[[], _Read]) -> _Read:
 def _tree(text: str, start: str) -> Any:
     if (found := re.search(r"at\s+the\s+(?:previous|next)\s+occurrence", text, re.IGNORECASE)) is not None:
         raise Unreadable(f"`{found[0]}` is not read: say it with `since` in RCL", found.start() + 1)
+    if re.match(r"\s*not\s+in\b", text, re.IGNORECASE):
+        raise Unreadable("a scope with `not in` begins with `when` or `if`", 1)
     try:
         return _lark().parse(_without_commas(text), start=start)
     except UnexpectedInput as error:

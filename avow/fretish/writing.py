@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from fractions import Fraction
+from functools import reduce
 
 from avow.base.diagnostics import Diagnostic
 from avow.formulas.formula import free_variables
@@ -12,7 +14,7 @@ from avow.language.contract import Clause, Contract, Node, Partial
 from avow.language.printer import show_sort
 from avow.language.sorts import BoolSort, EnumSort, IntegerSort, NaturalSort, RealSort
 
-from .sentence import FIRST, is_assumption
+from .sentence import FIRST, Expression, Unreadable, is_assumption, parse_expression
 
 
 class _Beyond(Exception):  # noqa: N818 - it names what happened
@@ -52,13 +54,13 @@ def _sentence(node: Node, clause: Clause, twice: set[str]) -> str:
         raise _Beyond(f"an input and an output that are both called `{min(doubled)}`")
     match formula:
         case t.Implies(left=trigger, right=t.History(operator=operator) as response) if operator in t.RESPONSES:
-            return f"{_condition(trigger)}the {node.name} shall {_response(response)}"
+            return f"{_condition(trigger)}the {_name(node.name)} shall {_response(response)}"
         case t.History(operator=operator) if operator in t.RESPONSES:
-            return f"whenever true the {node.name} shall {_response(formula)}"
+            return f"whenever true the {_name(node.name)} shall {_response(formula)}"
         case t.Implies(left=t.History(operator=t.Past.ROSE) as trigger, right=right):
-            return f"{_condition(trigger)}the {node.name} shall immediately satisfy {_say(right)}"
+            return f"{_condition(trigger)}the {_name(node.name)} shall immediately satisfy {_say(right)}"
         case _:  # one step
-            return f"the {node.name} shall always satisfy {_say(formula)}"
+            return f"the {_name(node.name)} shall always satisfy {_say(formula)}"
 
 
 def _condition(trigger: t.Term) -> str:
@@ -127,10 +129,10 @@ def _say(term: t.Term) -> str:
             return _infix(sign, term)
         case t.Operation(operator=t.Builtin.XOR | t.Builtin.MOD as operator):
             return _infix(operator, term)
-        case t.Operation(
-            operator=t.Builtin.ABS | t.Builtin.MIN | t.Builtin.MAX | t.Builtin.DIV as operator, arguments=arguments
-        ):
-            return f"{operator}({', '.join(map(_say, arguments))})"
+        case t.Operation(operator=t.Builtin.ABS, arguments=(inner,)):
+            return f"abs({_say(inner)})"
+        case t.Operation(operator=t.Builtin.MIN | t.Builtin.MAX as operator, arguments=arguments):
+            return reduce(lambda left, right: f"{operator}({left}, {right})", map(_say, arguments))
         case t.History(operator=t.Past.PREVIOUS, arguments=(value, first)):
             return f"{_previous(term)}({_say(first)}, {_say(value)})"
         case t.History(operator=t.Past.ROSE, arguments=(inner,)) if inner == t.TRUE:
@@ -143,7 +145,7 @@ def _say(term: t.Term) -> str:
         case t.History(operator=operator):
             raise _Beyond(f"`{operator}`")
         case _:
-            raise _Beyond(f"a {type(term).__name__.lower()} ({term.sort})" if term.children else "this term")
+            raise _Beyond(f"a {type(term).__name__.lower()} ({show_sort(term.sort)})" if term.children else "this term")
 
 
 def _infix(sign: str, term: t.Term) -> str:
@@ -168,6 +170,7 @@ def _number(value: Fraction) -> str:
 
 
 def _name(name: str) -> str:
-    if "'" in name or name == FIRST:
-        raise _Beyond(f"the name `{name}`")
-    return name
+    with suppress(Unreadable):
+        if name != FIRST and parse_expression(name) == Expression("name", text=name):
+            return name
+    raise _Beyond(f"the name `{name}`, which it reads otherwise")

@@ -72,6 +72,7 @@ def test_sentences_become_clauses_that_mean_the_same_again(tmp_path: Path, sente
         ("the pump shall satisfy", 23),
         ("pump satisfy off", 6),
         ("the pump shall within satisfy off", 23),
+        ("not in filling mode the pump shall satisfy off", 1),
         ("the pump shall satisfy at the next occurrence of p, q", 24),
         ("pump shall satisfy " + "!" * 3_500 + "p", 1),
         ("", 1),
@@ -187,16 +188,25 @@ def test_what_fretish_cannot_say_is_told_by_name() -> None:
     text = """
     context { T : {a, b}; }
     node n {
-      inputs( s : NATURAL --> NATURAL, x : REAL ) outputs( x : REAL, t : T ) topics()
+      inputs( s : NATURAL --> NATURAL, x : REAL, mode : T, True : BOOL, n : NATURAL )
+      outputs( x : REAL, t : T, y : NATURAL ) topics()
       guarantee g1 ( forall(i in NATURAL | in.s(i) > 0) )
       guarantee g2 ( out.x > in.x )
       guarantee g3 ( out.t == a -> within[200 ms](out.t == b) )
       guarantee g4 ( counted(TRUE since out.t == a) < 3 )
+      guarantee g5 ( in.mode == a -> out.t == b )
+      guarantee g6 ( in.True -> out.t == b )
+      guarantee g7 ( out.y == max(in.n, 3, min(in.n, 4)) )
+      guarantee g8 ( out.y == div(in.n, 2) )
+      guarantee g9 ( out.y == (if in.n > 3 then 1 else 2) )
     }"""
     found = to_fretish(contract(text))
-    assert found.text == "g3: whenever (t = a) the n shall within 200 milliseconds satisfy (t = b)\n"
+    assert found.text == (
+        "g3: whenever (t = a) the n shall within 200 milliseconds satisfy (t = b)\n"
+        "g7: the n shall always satisfy (y = max(max(n, 3), min(n, 4)))\n"
+    )
     told = " ".join(d.message for d in found.missing)
-    for word in ("g1", "g2", "both called `x`", "`counted`"):
+    for word in ("g1", "g2", "both called `x`", "`counted`", "`mode`", "`True`", "n.g8", "a conditional (NATURAL)"):
         assert word in told, told
 
 
