@@ -13,7 +13,6 @@ from avow.backend_kit.protocol import Job
 from avow.base.diagnostics import Diagnostic, Severity, Span
 from avow.base.suggestions import nearest
 from avow.formulas.renaming import bound_names
-from avow.formulas.traversal import depth
 from avow.language.contract import Clause
 from avow.language.sorts import DataSort, EnumSort
 from avow.language.subterms import subterms
@@ -30,7 +29,7 @@ from .shape import TooComplex
 from .syntax import DeedKind
 from .terms import Struct
 from .timing import timed
-from .tuning import FORMULA_DEPTH, PROPERTIES
+from .tuning import PROPERTIES
 from .words import runs, together
 
 
@@ -145,8 +144,6 @@ def _claim(clause: Clause, mapper: Mapper, setup: Setup, keys: set[str]) -> Clai
 
 
 def _instantiate(clause: Clause, mapper: Mapper, stand_ins: Sequence[Extra], keys: set[str]) -> Claim:
-    if depth(clause.formula) > FORMULA_DEPTH:
-        raise TooComplex
     found: dict[Formula, Property] = {}
     about: dict[Formula, list[str]] = {}
     timing = timed(clause.formula)

@@ -224,7 +224,7 @@ class _OptionsReader:
         except Rejected as error:
             self.faults.extend(error.diagnostics)
             return None
-        except TooComplex:
+        except (TooComplex, RecursionError):
             self.fault("AJPF123", "the pattern is too complex", *path)
             return None
         return term, bound_names(term)

@@ -14,8 +14,8 @@ from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.base.grammars import lark_of
 
 from .syntax import RECEIVED, SENT, Condition, Deed, DeedKind, Event, Goal, GoalKind, Plan, Program, Rule, Sign
-from .terms import CONS, NIL, Struct, Var, deeper, is_ground, show
-from .tuning import PROGRAM_BYTES, TERM_DEPTH
+from .terms import CONS, NIL, Struct, Var, is_ground, show
+from .tuning import PROGRAM_BYTES
 
 _SAID = {
     "ATOM": "a name",
@@ -43,7 +43,7 @@ def parse_fact(text: str) -> Struct | None:
     """One ground literal, such as a percept ``danger`` or ``result(0, 3)``, or None."""
     builder = _Builder("")
     try:
-        made = builder.transform(_grammar().parse(text, start="struct")) if len(text) <= 1000 else None
+        made = builder.transform(_grammar().parse(text, start="struct"))
     except (UnexpectedInput, VisitError, RecursionError):
         return None
     return made if isinstance(made, Struct) and is_ground(made) else None
@@ -57,14 +57,10 @@ def parse_system(text: str, file: str) -> tuple[Program, ...]:
         agents: tuple[Program, ...] = builder.transform(tree)
     except UnexpectedInput as error:
         raise Rejected(_unexpected(error, text, file)) from None
-    except RecursionError:
+    except (RecursionError, VisitError) as error:
+        if not isinstance(getattr(error, "orig_exc", error), RecursionError):
+            raise
         raise Rejected(Diagnostic("AJPF102", "nested too deeply", _at(file, 1, 1))) from None
-    except VisitError as error:
-        if isinstance(error.orig_exc, Rejected):
-            raise error.orig_exc from None
-        if isinstance(error.orig_exc, RecursionError):
-            raise Rejected(Diagnostic("AJPF102", "nested too deeply", _at(file, 1, 1))) from None
-        raise
     for at, agent in enumerate(agents):
         if agent.name in [other.name for other in agents[:at]]:
             message = f"there are two agents called '{agent.name}'"
@@ -117,14 +113,13 @@ def _build(method: Any) -> Any:
 
 
 class _Builder(Transformer):  # type: ignore[misc]
-    """Parse tree to data. Its recursion is bounded: only terms nest, and `struct` measures how deep."""
+    """Parse tree to data."""
 
     def __init__(self, file: str) -> None:
         super().__init__()
         self.file = file
         self.problems: list[Diagnostic] = []
         self.fresh = count(1)
-        self.depths: dict[int, tuple[int, Struct]] = {}
 
     def span(self, meta: Any) -> Span:
         if meta.empty:
@@ -133,15 +128,8 @@ class _Builder(Transformer):  # type: ignore[misc]
 
     # Terms
 
-    @_build
-    def struct(self, meta: Any, parts: list[Any]) -> Struct:
-        args = tuple(p for p in parts[1:] if p is not None)
-        depth = 1 + max((self.depths[id(a)][0] if id(a) in self.depths else 1 for a in args), default=0)
-        if depth > TERM_DEPTH:
-            raise Rejected(Diagnostic("AJPF102", f"a term nested more than {TERM_DEPTH} deep", self.span(meta)))
-        made = Struct(str(parts[0]), args)
-        self.depths[id(made)] = (depth, made)  # the reference keeps the id from being reused
-        return made
+    def struct(self, parts: list[Any]) -> Struct:
+        return Struct(str(parts[0]), tuple(p for p in parts[1:] if p is not None))
 
     def variable(self, parts: list[Token]) -> Var:
         return Var(str(parts[0]))
@@ -180,22 +168,16 @@ class _Builder(Transformer):  # type: ignore[misc]
         made = Struct(NIL)
         for item in reversed([p for p in parts if p is not None]):
             made = Struct(CONS, (item, made))
-        return self.measured(made)
+        return made
 
     def open_list(self, parts: list[Any]) -> Struct:
         made = parts[-1]
         for item in reversed(parts[:-1]):
             made = Struct(CONS, (item, made))
-        return self.measured(made)
+        return made  # type: ignore[no-any-return]
 
-    def measured(self, made: Struct) -> Struct:
-        if deeper(made, TERM_DEPTH):
-            raise Rejected(Diagnostic("AJPF102", f"a term nested more than {TERM_DEPTH} deep", _at(self.file, 1, 1)))
-        return made
-
-    @_build
-    def arithmetic(self, meta: Any, parts: list[Any]) -> Struct:
-        return self.measured(Struct(str(parts[1]), (parts[0], parts[2])))
+    def arithmetic(self, parts: list[Any]) -> Struct:
+        return Struct(str(parts[1]), (parts[0], parts[2]))
 
     def equation(self, parts: list[Any]) -> tuple[str, Struct]:
         return str(parts[1]), Struct(str(parts[1]), (parts[0], parts[2]))

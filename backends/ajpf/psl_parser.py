@@ -19,7 +19,6 @@ from avow.base.grammars import lark_of, misfit
 from . import psl
 from .psl import Atom, Formula, Modality
 from .terms import Struct, Term, Var, subterms
-from .tuning import PROPERTY_LENGTH, PROPERTY_NESTING
 
 _BINARY: Mapping[str, Callable[[Formula, Formula], Formula]] = {"U": psl.Until, "R": psl.Release, "->": psl.Implies}
 _JUNCTIONS: Mapping[str, Callable[[tuple[Formula, ...]], Formula]] = {"&": psl.And, "||": psl.Or}
@@ -42,13 +41,6 @@ class Malformed(Exception):  # noqa: N818 - it names the text
 
 def parse_psl(text: str) -> Formula:
     """Raises Malformed."""
-    if len(text) > PROPERTY_LENGTH:
-        raise Malformed(f"longer than {PROPERTY_LENGTH} characters", 0)
-    depth = 0
-    for at, sign in enumerate(text):
-        depth += (sign == "(") - (sign == ")")
-        if depth > PROPERTY_NESTING:
-            raise Malformed(f"brackets nested more than {PROPERTY_NESTING} deep", at)
     grammar = lark_of(Path(__file__).with_name("psl.lark"), "psl", ("row",), _Builder, lexer="contextual")
     try:
         formula: Formula = grammar.parse(text)

@@ -13,21 +13,20 @@ from fractions import Fraction
 from avow.formulas.flattening import joined
 from avow.formulas.negation_normal_form import push_negations
 from avow.formulas.renaming import bound_names
-from avow.formulas.traversal import depth
 from avow.language import terms as t
 from avow.language.operators import FLIPPED
 from avow.language.sorts import BOOL, INTEGER, NATURAL, BoolSort, IntegerSort, NaturalSort, RealSort
 
-from .tuning import FORMULA_DEPTH, MULTIPLIED_OUT, PARTS
+from .tuning import MULTIPLIED_OUT, PARTS
 
 
 class TooComplex(Exception):  # noqa: N818 - it names what happened
-    """The formula is nested too deeply, or multiplies out to too many parts."""
+    """The formula multiplies out to too many parts."""
 
 
 def shape(term: t.Term) -> t.Term:
     """The normal form of a formula. Raises TooComplex."""
-    if depth(term) > FORMULA_DEPTH or _written_out(term) > PARTS:
+    if _written_out(term) > PARTS:
         raise TooComplex
     return _shaped(term)
 

@@ -79,18 +79,6 @@ def variables(term: Term) -> Iterator[str]:
     return (part.name for part in subterms(term) if isinstance(part, Var))
 
 
-def deeper(term: Term, most: int) -> bool:
-    """Whether a term is nested deeper than that. A list nests as deep as it is long."""
-    stack = [(term, 1)]
-    while stack:
-        part, depth = stack.pop()
-        if depth > most:
-            return True
-        if isinstance(part, Struct):
-            stack.extend((arg, depth + 1) for arg in part.args)
-    return False
-
-
 def is_ground(term: Term) -> bool:
     return isinstance(term, Struct) and all(map(is_ground, term.args))
 

@@ -31,12 +31,6 @@ DEFAULT_STATES = 1_000_000
 PROGRAM_BYTES = 2_000_000
 """A larger file is not a hand-written agent."""
 
-PROPERTY_LENGTH = 20_000
-"""Characters of a property written by hand."""
-
-PROPERTY_NESTING = 60
-"""Brackets of such a property: the parser recurses, and AJPF's does too."""
-
 ALTERNATIVES = 8
 """Alternatives of a trigger that are each explained: a reader follows no more."""
 
@@ -58,17 +52,11 @@ GRACE = 0.5
 NEARBY = 200_000
 """States among which a run that refutes a property is sought first: it is found sooner, and is shorter."""
 
-FORMULA_DEPTH = 120
-"""Deeper guarantees are refused by name: the translation recurses."""
-
 MULTIPLIED_OUT = 256
 """More disjuncts (or conjuncts) than this under one quantifier are not multiplied out."""
 
 PARTS = 20_000
 """More parts than this are not written out."""
-
-TERM_DEPTH = 40
-"""Terms nested deeper are refused by the parsers, so that every walk over a term may recurse."""
 
 TAUTOLOGY_CASES = 4_000
 """Cases examined, in all, before a formula is taken to depend on the agent."""
