@@ -10,9 +10,8 @@ further laws: a property that follows from these alone shows nothing about the a
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
-from itertools import combinations, permutations
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from itertools import permutations
 
 from avow.base.graphs import strong_components
 
@@ -20,7 +19,7 @@ from . import psl
 from .beliefs import renamed_rule
 from .psl import Atom, Formula, Modality
 from .syntax import Condition, DeedKind, Program, Rule
-from .terms import Bindings, Struct, Term, Var, apply, is_ground, named_apart, rename, unify, variables
+from .terms import Bindings, Struct, Term, Var, apart, apply, is_ground, named_apart, rename, unify, variables
 from .tuning import STANDING_ATOMS, STANDING_INSTANCES, TAUTOLOGY_CASES
 
 _EXISTENTIAL = (Modality.DID, Modality.WANTS, Modality.INTENDS, Modality.INTENDS_TO_DO, Modality.PERCEPT)
@@ -34,16 +33,10 @@ def _no_laws(atoms: tuple[Atom, ...]) -> Iterable[Formula]:
     return ()
 
 
-@dataclass(slots=True)
-class Steps:
-    left: int = TAUTOLOGY_CASES
-
-
 def is_valid(formula: Formula, laws: Laws = _no_laws) -> bool:
     """Whether a property holds on every run of every agent that satisfies the laws. Raises ltl.TooLarge."""
     automaton = psl.automaton_of(psl.Not(formula))
     known: dict[int, bool] = {}
-    steps = Steps()
 
     def possible(node: int) -> bool:
         if node not in known:
@@ -53,7 +46,7 @@ def is_valid(formula: Formula, laws: Laws = _no_laws) -> bool:
                     literals.append(leaf)
                 if automaton.negative[node] >> at & 1:
                     literals.append(psl.Not(leaf))
-            known[node] = is_satisfiable(psl.And(tuple(literals)), steps, laws)
+            known[node] = is_satisfiable(psl.And(tuple(literals)), laws)
         return known[node]
 
     def successors(node: int) -> list[int]:
@@ -73,97 +66,64 @@ def constant(formula: Formula) -> bool | None:
     return None if is_satisfiable(psl.Not(formula)) else True
 
 
-def is_satisfiable(formula: Formula, steps: Steps | None = None, laws: Laws = _no_laws) -> bool:
+def is_satisfiable(formula: Formula, laws: Laws = _no_laws) -> bool:
     """For a formula without temporal operators; also true if deciding it would take too long."""
     atoms = tuple(dict.fromkeys(psl.atoms(formula)))
-    whole = psl.And((formula, *_laws(atoms), *laws(atoms)))
-    steps = steps or Steps()
+    conditions = (formula, *_laws(atoms), *laws(atoms))
     pending: list[dict[Atom, bool]] = [{}]
-    while pending:
+    for _ in range(TAUTOLOGY_CASES):
+        if not pending:
+            return False
         assigned = pending.pop()
-        steps.left -= 1
-        if steps.left < 0:
+        values = [_value(condition, assigned) for condition in conditions]
+        if False in values:
+            continue
+        if None not in values:
             return True
-        open_atoms: list[Atom] = []
-        value = _value(whole, assigned, open_atoms)
-        if value is True:
-            return True
-        if value is None:
-            first = open_atoms[0]
-            pending += [{**assigned, first: True}, {**assigned, first: False}]
-    return False
+        undecided = psl.atoms(conditions[values.index(None)])
+        first = next(atom for atom in undecided if atom not in assigned)
+        pending += [{**assigned, first: True}, {**assigned, first: False}]
+    return True
 
 
-def _value(formula: Formula, assigned: dict[Atom, bool], open_atoms: list[Atom]) -> bool | None:
-    """The truth value if the assignment decides it; atoms that are needed next are added to `open_atoms`."""
+def _value(formula: Formula, assigned: Mapping[Atom, bool]) -> bool | None:
+    """The truth value, or None if atoms without a value decide it."""
     match formula:
         case psl.Truth(value=value):
             return value
         case Atom():
-            if formula not in assigned:
-                open_atoms.append(formula)
             return assigned.get(formula)
         case psl.Not(body=body):
-            inner = _value(body, assigned, open_atoms)
+            inner = _value(body, assigned)
             return None if inner is None else not inner
-        case psl.And(items=items):
-            return _junction(items, False, assigned, open_atoms)
-        case psl.Or(items=items):
-            return _junction(items, True, assigned, open_atoms)
+        case psl.And(items=items) | psl.Or(items=items):
+            deciding = isinstance(formula, psl.Or)
+            values = {_value(item, assigned) for item in items}
+            return deciding if deciding in values else None if None in values else not deciding
         case psl.Implies(left=left, right=right):
-            return _junction((psl.Not(left), right), True, assigned, open_atoms)
+            return _value(psl.Or((psl.Not(left), right)), assigned)
     raise AssertionError(formula)
 
 
-def _junction(
-    items: Iterable[Formula], deciding: bool, assigned: dict[Atom, bool], open_atoms: list[Atom]
-) -> bool | None:
-    undecided = False
-    for item in items:
-        value = _value(item, assigned, open_atoms)
-        if value is deciding:
-            return deciding
-        undecided = undecided or value is None
-    return None if undecided else not deciding
-
-
-def _laws(atoms: tuple[Atom, ...]) -> tuple[Formula, ...]:
-    found: list[Formula] = []
+def _laws(atoms: tuple[Atom, ...]) -> Iterator[Formula]:
     for one, other in permutations(atoms, 2):
-        same = one.agent == other.agent
-        if same and one.modality is other.modality in _EXISTENTIAL and _meet(one.term, other.term, _covered):
-            found.append(psl.Implies(one, other))
-        if same and (one.modality, other.modality) == (Modality.INTENDS, Modality.WANTS) and one.term == other.term:
-            found.append(psl.Implies(one, other))
-    for one, other in combinations([a for a in atoms if a.modality is Modality.DID], 2):
-        if one.agent == other.agent and not _meet(one.term, other.term, _overlap):
-            found.append(psl.Not(psl.And((one, other))))
-    return tuple(found)
+        if one.agent != other.agent:
+            continue
+        if one.modality is other.modality in _EXISTENTIAL and _covers(other.term, one.term):
+            yield psl.Implies(one, other)
+        if (one.modality, other.modality) == (Modality.INTENDS, Modality.WANTS) and one.term == other.term:
+            yield psl.Implies(one, other)
+        if one.modality is other.modality is Modality.DID and not _overlap(one.term, other.term):
+            yield psl.Not(psl.And((one, other)))
 
 
-def _covered(special: Term, general: Term) -> bool | None:
-    return True if isinstance(general, Var) else False if isinstance(special, Var) else None
+def _covers(general: Struct, special: Struct) -> bool:
+    """Each ``_`` of the general term stands for anything, on its own; each of the special one for something."""
+    return unify(named_apart(general), rename(special, {"_": Struct("_")}), {}) is not None
 
 
-def _overlap(one: Term, other: Term) -> bool | None:
-    return True if isinstance(one, Var) or isinstance(other, Var) else None
-
-
-def _meet(one: Term, other: Term, at_variables: Callable[[Term, Term], bool | None]) -> bool:
-    """Each ``_`` stands for anything, on its own."""
-    pending = [(one, other)]
-    while pending:
-        left, right = pending.pop()
-        answer = at_variables(left, right)
-        if answer is False:
-            return False
-        if answer is None:
-            assert not isinstance(left, Var)
-            assert not isinstance(right, Var)
-            if left.functor != right.functor or len(left.args) != len(right.args):
-                return False
-            pending += zip(left.args, right.args, strict=True)
-    return True
+def _overlap(one: Struct, other: Struct) -> bool:
+    return unify(named_apart(one), apart(named_apart(other), "'"), {}) is not None
 
 
 # Facts about one agent whatever its plans do

@@ -59,7 +59,7 @@ PARTS = 20_000
 """More parts than this are not written out."""
 
 TAUTOLOGY_CASES = 4_000
-"""Cases examined, in all, before a formula is taken to depend on the agent."""
+"""Cases examined before a formula is taken to depend on the agent."""
 
 INDICES_TRIED = 400
 """Combinations of index values with which a row is tried in each step."""
