@@ -8,7 +8,6 @@ from fractions import Fraction
 
 from avow.base.diagnostics import Diagnostic, Span
 from avow.base.suggestions import did_you_mean
-from avow.base.tuning.sizes import CLAUSE_PARTS, NESTING
 from avow.language.checker import Checker
 from avow.language.contract import Chance, Clause, ClauseKind, Node, Port, Topic
 from avow.language.declarations import Declarations, no_units
@@ -19,9 +18,9 @@ from avow.language.printer import show_type
 from avow.language.scope import Defined, Scope
 from avow.language.sorts import BoolSort, EnumSort, IntegerSort, NaturalSort, RealSort, Sort, StringSort
 from avow.language.source import Reports
-from avow.language.subterms import histories, term_extent
+from avow.language.subterms import histories
 from avow.language.syntax import ChanceSyntax, ClauseSyntax, NodeSyntax, PortDeclaration, RosType, SetType
-from avow.language.terms import TRUE, Role, Term
+from avow.language.terms import TRUE, Role
 from avow.language.units import BASES, DERIVED, ONE_UNIT, clashes, unit
 from avow.ros.calls import part_topic
 from avow.ros.names import is_name
@@ -177,7 +176,7 @@ def _clause(
     if syntax.chance is not None:
         return _with_chance(syntax, syntax.chance, name, position, scope, reports)
     formula = Checker(scope, reports).clause(syntax.formula)
-    if formula is None or not _is_small(formula, place, scope, reports):
+    if formula is None:
         return None
     text = reports.source.text[slice(*syntax.inside)].strip()
     return Clause(syntax.kind, name, position, with_value(formula), *_quoted(syntax, text, reports), formula)
@@ -206,9 +205,6 @@ def _with_chance(
     claim = checker.formula(syntax.formula)
     if fault or given is None or claim is None:
         return None
-    place = syntax.name or Token("", "", syntax.start, syntax.start + 1)
-    if not all(_is_small(formula, place, scope, reports) for formula in (given, claim)):
-        return None
     text = f"{reports.source.text[chance.start : chance.end]} ( {reports.source.text[slice(*syntax.inside)].strip()} )"
     least, written = Fraction(chance.least.text), Chance(Fraction(chance.least.text), claim, given).always
     made = Chance(least, with_value(claim), with_value(given), chance.per_run)
@@ -227,21 +223,6 @@ def _no_probability(kind: ClauseKind, text: str) -> tuple[str, str] | None:
     if least == 0:
         return "probability 0 demands nothing", "write a number between 0 and 1, or leave the guarantee out"
     return None
-
-
-def _is_small(formula: Term, place: Token, scope: Scope, reports: Reports) -> bool:
-    """Whether the formula with its constants expanded is within the limits of size; reports it if not. Without
-    constants its size and depth are those of the text, which the parser has checked."""
-    if not scope.environment.constants and not scope.defined:
-        return True
-    size, depth = term_extent(formula)
-    if size <= CLAUSE_PARTS and depth <= 2 * NESTING:
-        return True
-    what = f"{size:,} parts" if size > CLAUSE_PARTS else f"{depth} levels"
-    most = f"{CLAUSE_PARTS:,} parts and {2 * NESTING} levels are the most"
-    message = f"with its constants written out, this has {what}; {most}"
-    reports.error("RCL110", message, place.start, place.end, hint="use fewer or smaller constants")
-    return False
 
 
 def _topics(node: NodeSyntax, scope: Scope, reports: Reports) -> Iterable[Topic]:

@@ -1,4 +1,4 @@
-"""The subterms of a term, in reading order and at any depth; and the size of a term."""
+"""The subterms of a term, in reading order and at any depth."""
 
 from __future__ import annotations
 
@@ -51,27 +51,3 @@ def ports_of(term: Term) -> tuple[Variable, ...]:
     return tuple(
         dict.fromkeys(part for part in subterms(term) if isinstance(part, Variable) and part.role is not Role.BOUND)
     )
-
-
-# --- how large it is --------------------------------------------------------------------------------------------------
-
-# Declarations share the values that they name (`A = B + B; B = C + C; …`), so a few lines can denote a term too large
-# for any later pass. A clause that is too large or too deep once every name in it is expanded is therefore refused.
-
-
-def term_extent(term: Term) -> tuple[int, int]:
-    """A term's parts, and their depth. Visits each shared part once, and never recurses."""
-    known: dict[int, tuple[int, int]] = {}
-    stack: list[tuple[Term, bool]] = [(term, False)]
-    while stack:
-        part, ready = stack.pop()
-        if id(part) in known:
-            continue
-        inner = part.children
-        if ready or not inner:
-            found = [known[id(p)] for p in inner]
-            known[id(part)] = (1 + sum(size for size, _ in found), 1 + max((depth for _, depth in found), default=0))
-        else:
-            stack.append((part, True))
-            stack += [(p, False) for p in inner]
-    return known[id(term)]

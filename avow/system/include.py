@@ -13,7 +13,6 @@ from dataclasses import replace
 from pathlib import Path
 
 from avow.base.diagnostics import Diagnostic, Rejected
-from avow.base.tuning.sizes import INCLUDED_NODES
 from avow.language.contract import Contract
 from avow.ros.names import Placed, Resolver
 from avow.system.folding import holders, outermost
@@ -39,9 +38,6 @@ def include(plan: Plan, contract: Contract, load: Load) -> tuple[Plan, Contract,
             faults += rejected.diagnostics
             continue
         clashes = _clashes(subsystem, contract, part.contract)
-        if len(contract.nodes) + len(part.contract.nodes) > INCLUDED_NODES:
-            message = f"subsystems.{subsystem.name}: more than {INCLUDED_NODES} nodes in all"
-            clashes = [Diagnostic("PLAN110", message, subsystem.options.at("system"))]
         faults += clashes
         if not clashes:
             plan, contract, inner = _taken_in(plan, contract, subsystem, part)

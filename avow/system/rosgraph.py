@@ -19,7 +19,7 @@ from avow.base.files import read_regular
 from avow.base.grammars import lark_of, misfit
 from avow.base.records import dataclass
 from avow.base.suggestions import suggest
-from avow.base.tuning.sizes import ROS_GRAPH_ARCS, ROS_GRAPH_BYTES
+from avow.base.tuning.sizes import ROS_GRAPH_BYTES
 from avow.ros.drafting import is_plumbing
 from avow.ros.listing import is_info, parse_info
 from avow.system.graph import Graph
@@ -148,8 +148,6 @@ def _from_dot(text: str, path: Path) -> RosGraph:
         if tail not in topics:
             ends = heard.get(head, ()) if head in topics else (head,)
             arcs |= dict.fromkeys((bare[tail], bare[e], called[head] if head in topics else label) for e in ends)
-        if len(arcs) > ROS_GRAPH_ARCS:
-            raise Rejected(_fault(path, 1, f"the ROS graph has more than {ROS_GRAPH_ARCS} arcs"))
     return RosGraph(tuple(dict.fromkeys(bare[name] for name in graph.nodes if name not in topics)), tuple(arcs))
 
 
@@ -197,7 +195,7 @@ def _fault(path: Path, line: int, message: str, column: int = 1) -> Diagnostic:
 
 
 class Malformed(Exception):  # noqa: N818 - it names what the text is
-    """Not a graph in DOT, or one beyond all limits; line and column count from 1."""
+    """Not a graph in DOT, or one nested too deeply; line and column count from 1."""
 
     def __init__(self, message: str, line: int = 1, column: int = 1) -> None:
         super().__init__(message)
@@ -247,8 +245,6 @@ def _inside(tree: Any, found: DotGraph, nodes: Mapping[str, str], arcs: Mapping[
                 if parts[0].data == "node" and len(parts) == 1:
                     found.nodes[next(iter(ends[0]))] |= given
                 for tails, heads in pairwise(ends):
-                    if len(found.arcs) + len(tails) * len(heads) > ROS_GRAPH_ARCS:
-                        raise Malformed(f"the graph has more than {ROS_GRAPH_ARCS} arcs")
                     label = {**arcs, **given}.get("label", "")
                     found.arcs.extend((tail, head, label) for tail in tails for head in heads)
     return here

@@ -1,8 +1,8 @@
 """Strict YAML for configuration: every piece keeps its place, nothing is guessed.
 
 `yaml.safe_load` accepts duplicate keys silently, reads ``off`` as False, ``1:30`` as 90 and ``010`` as 8, expands
-aliases without bound, and loses positions. This reader works on PyYAML's nodes: scalars are null, true, false,
-JSON numbers or text; duplicate keys, tags and merge keys are errors; aliases may be used, within bounds.
+aliases without a word, and loses positions. This reader works on PyYAML's nodes: scalars are null, true, false,
+JSON numbers or text; duplicate keys, tags and merge keys are errors; aliases may be used.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ import yaml
 from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.base.plain import invisible
 from avow.base.records import dataclass
-from avow.base.tuning.sizes import PLAN_BYTES, PLAN_DEPTH, PLAN_PIECES
+from avow.base.tuning.sizes import PLAN_BYTES
 from avow.system.plan import Located
 
 _INTEGER = re.compile(r"-?(0|[1-9][0-9]*)\Z")
@@ -39,9 +39,6 @@ class Piece:
     items: list[Piece] | None = None
     entries: dict[str, Piece] | None = None
     keys: dict[str, Span] = field(default_factory=dict)
-    size: int = 1
-    """The number of pieces in it, itself included, aliases expanded."""
-    depth: int = 0
     quoted: bool = False
 
     @property
@@ -226,49 +223,36 @@ class _Builder:
     def build(self, text: str) -> Piece:
         try:
             root = yaml.compose(text, _Composer)
+            if root is None:
+                raise Rejected(_error("the file is empty", self.file, 1, 1))
+            return self.piece(root)
         except RecursionError:
-            raise Rejected(_error(_TOO_DEEP, self.file, 1, 1)) from None
-        if root is None:
-            raise Rejected(_error("the file is empty", self.file, 1, 1))
-        return self.piece(root, 0)
+            raise Rejected(_error("nested too deeply", self.file, 1, 1)) from None
 
-    def piece(self, node: yaml.Node, depth: int) -> Piece:
-        if node in self.made:
-            known = self.made[node]
-            if known is None:
-                raise self.reject(node, "PLAN101", "an alias stands in what it repeats")
-        else:
+    def piece(self, node: yaml.Node) -> Piece:
+        if node not in self.made:
             self.made[node] = None
             if node.tag:
                 self.problem(node, "PLAN101", f"the tag {node.tag} is not read; write plain values")
-            known = self.made[node] = self.new(node, depth)
-        if depth + known.depth > PLAN_DEPTH:
-            raise self.reject(node, "PLAN101", _TOO_DEEP)
+            self.made[node] = self.new(node)
+        known = self.made[node]
+        if known is None:
+            raise self.reject(node, "PLAN101", "an alias stands in what it repeats")
         return known
 
-    def new(self, node: yaml.Node, depth: int) -> Piece:
+    def new(self, node: yaml.Node) -> Piece:
         if isinstance(node, yaml.ScalarNode):
             text = self.text(node)
             value, quoted = scalar(text) if node.style is None else text, node.style in ("'", '"')
             return Piece(self.span(node), value, text, quoted=quoted)
-        if depth >= PLAN_DEPTH:
-            raise self.reject(node, "PLAN101", _TOO_DEEP)
         found = Piece(self.span(node))
         if isinstance(node, yaml.MappingNode):
             found.entries = {}
             for key, value in node.value:
-                found.entries[self.key(key, found)] = self.grown(found, value, depth)
+                found.entries[self.key(key, found)] = self.piece(value)
         else:
-            found.items = [self.grown(found, value, depth) for value in node.value]
+            found.items = [self.piece(value) for value in node.value]
         return found
-
-    def grown(self, whole: Piece, node: yaml.Node, depth: int) -> Piece:
-        part = self.piece(node, depth + 1)
-        whole.depth = max(whole.depth, part.depth + 1)
-        whole.size += part.size
-        if whole.size > PLAN_PIECES:
-            raise self.reject(node, "PLAN101", f"more than {PLAN_PIECES} pieces once its aliases are expanded")
-        return part
 
     def key(self, node: yaml.Node, whole: Piece) -> str:
         if not isinstance(node, yaml.ScalarNode):
@@ -296,9 +280,6 @@ class _Builder:
 
     def reject(self, node: yaml.Node, code: str, message: str) -> Rejected:
         return Rejected(Diagnostic(code, message, self.span(node)))
-
-
-_TOO_DEEP = f"nested deeper than {PLAN_DEPTH} levels"
 
 
 def _places(piece: Piece, path: tuple[str | int, ...]) -> Iterator[tuple[tuple[str | int, ...], Span]]:

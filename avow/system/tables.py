@@ -12,7 +12,7 @@ from typing import Any
 from avow.base.diagnostics import Diagnostic, Span
 from avow.base.files import read_regular
 from avow.base.suggestions import suggest
-from avow.base.tuning.sizes import RANGE_VALUES, TABLE_CELLS
+from avow.base.tuning.sizes import RANGE_VALUES
 from avow.system.plan import Table
 from avow.system.strict_yaml import Piece
 
@@ -42,8 +42,6 @@ def read_csv(name: str, path: Path, span: Span) -> tuple[Table | None, tuple[Dia
     for line, row in others:
         if len(row) != len(header):
             return fault(f"{path.name}: {len(row)} cells where {len(header)} are wanted", line)
-    if len(rows) * len(header) > TABLE_CELLS:
-        return fault(f"{path.name} has more than {TABLE_CELLS} cells")
     return Table(name, header, tuple(row for _, row in others), path), ()
 
 

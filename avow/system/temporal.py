@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING
 
 from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.base.records import dataclass
-from avow.base.tuning.sizes import PROPERTY_DEPTH, PROPERTY_LENGTH
 from avow.language.contract import Contract, Node, Port
 from avow.language.definedness import unless_without_value, with_value
 from avow.language.syntax import Ahead, Connective, Lasting, Name, Negation, Sign, unparenthesised, walk
@@ -60,13 +59,11 @@ Property = State | Temporal
 
 def parse_property(text: str, contract: Contract, span: Span | None = None) -> Property:
     """A temporal property, as a claim. Raises Rejected with every fault found."""
-    if len(text) > PROPERTY_LENGTH:
-        raise Rejected(Diagnostic("PLAN114", "the property is too long", span))
     from avow.language.load import syntax_of  # the grammar is slow to import
     from avow.language.source import in_order
 
     tree, reports = syntax_of(text, span, _marked)
-    found = None if tree is None else _property(tree, reports, contract, 0)
+    found = None if tree is None else _property(tree, reports, contract)
     if found is None or reports.failed:
         raise Rejected(*in_order(reports))
     return _claimed(found, span)
@@ -155,11 +152,11 @@ _BEFORE = frozenset((*_INSIDE, "LSQUARE", "BAR", "IFF", "IMPLIES", "OR", "AND", 
 _AFTER = frozenset((*_INSIDE, "NAME", "STRING", "MINUS", "NUMBER", "FORALL", "EXISTS", "UNIQUE", "TRUE", "FALSE", "LT"))
 
 
-def _property(tree: TermSyntax, reports: Reports, contract: Contract, depth: int) -> Property:
+def _property(tree: TermSyntax, reports: Reports, contract: Contract) -> Property:
     """Faults are reported."""
 
     def made(operator: str, *parts: TermSyntax) -> Temporal:
-        return Temporal(Operator(operator), tuple(_property(part, reports, contract, depth + 1) for part in parts))
+        return Temporal(Operator(operator), tuple(_property(part, reports, contract) for part in parts))
 
     tree = unparenthesised(tree)
     if not any(isinstance(part, Ahead) or _is_until(part) for part in walk(tree)):
@@ -170,8 +167,6 @@ def _property(tree: TermSyntax, reports: Reports, contract: Contract, depth: int
         assert term is not None or reports.failed
         return State(term or TRUE, text)
     match tree:
-        case _ if depth > PROPERTY_DEPTH:
-            message = "nested too deeply"
         case Ahead(function=Name(text=word), arguments=parts):
             return made(word, *parts)
         case Negation(body=body):

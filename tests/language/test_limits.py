@@ -10,7 +10,6 @@ from avow.formulas.formula import node_digest
 from avow.language.contract import Contract
 from avow.language.format import format_text
 from avow.language.load import check_text
-from avow.language.subterms import term_extent
 from avow.language.translate import to_json, to_unicode
 
 NODE = "node n { inputs( i : %s ) outputs( o : BOOL ) topics() guarantee( %s ) }"
@@ -33,26 +32,12 @@ def row(count: int, first: str, form: str, last: str = "") -> str:
 @pytest.mark.parametrize(
     ("context", "sort", "formula"),
     [
-        (row(60, "C0 = 1;", "C{0} = C{1} + C{1};"), "REAL", "o or C59 > 1"),
-        (row(400, "C0 = 1;", "C{0} = -(C{1});"), "REAL", "o or C399 > 1"),
         (row(4000, "", "C{1} = C{0} + 1;", "C3999 = 1;"), "REAL", "o or C0 > 1"),
         (row(4000, "", "T{1} : T{0};", "T3999 : REAL;"), "T0", "o"),
     ],
 )
 def test_what_is_too_large_is_refused(context: str, sort: str, formula: str) -> None:
     assert codes(context + NODE % (sort, formula)) == ["RCL110"]
-
-
-def test_constants_in_formulas_count() -> None:
-    context = row(13, "C0 = 1;", "C{0} = C{1} + C{1};")
-    assert codes(context + NODE % ("REAL", "o or C12 > 1")) == []
-    many = " or ".join(["C12 > i"] * 600)
-    assert codes(context + NODE % ("REAL", many)) == ["RCL110"]
-    deep = row(150, "C0 = 1;", "C{0} = -(C{1});")
-    assert codes(deep + NODE % ("REAL", "o or C149 > 1")) == []
-    within = "(1 - " * 70 + "(1 / C149)" + ")" * 70
-    assert codes(deep + NODE % ("REAL", f"o or {within} > 1")) == []
-    assert codes(deep + NODE % ("REAL", f"o or {within.replace('(1 -', '(-(1 -').replace(')', '))')} > 1")) != []
 
 
 def test_declarations_in_a_moderate_row_are_accepted_whatever_their_order() -> None:
@@ -91,9 +76,3 @@ def test_what_is_as_deep_as_may_be_breaks_nothing(formula: str) -> None:
     assert to_json(contract)
     assert node_digest(contract.nodes[0], contract.nodes[0].guarantees[0])
     assert hash(contract.nodes[0].guarantees[0].formula)
-
-
-def test_extent() -> None:
-    contract = check_text(NODE % ("REAL", "i > 1 and o"), "f")[0]
-    assert contract is not None
-    assert term_extent(contract.nodes[0].guarantees[0].formula) == (5, 3)

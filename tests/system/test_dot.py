@@ -12,7 +12,6 @@ import pytest
 from helpers import some
 
 from avow.base.diagnostics import Rejected
-from avow.base.tuning.sizes import ROS_GRAPH_ARCS
 from avow.system.rosgraph import Malformed, RosGraph, parse_dot, read_ros_graph
 
 IDS = [
@@ -114,9 +113,6 @@ def test_topics_are_boxes_whatever_the_spelling(tmp_path: Path, text: str) -> No
     assert set(found.nodes) == {"a", "b", "c"}
 
 
-MANY = " ".join(f"n{k}" for k in range(2000))
-
-
 @pytest.mark.parametrize(
     ("text", "line", "said"),
     [
@@ -127,12 +123,10 @@ MANY = " ".join(f"n{k}" for k in range(2000))
         ("digraph { a }\ndigraph { b }", 2, "does not belong"),
         ("digraph { a [label] }", 1, "does not belong"),
         ("digraph " + "{" * 20_000 + "}" * 20_000, 1, "too deeply"),
-        (f"digraph {{ {{{MANY}}} -> {{{MANY}}} }}", 1, f"more than {ROS_GRAPH_ARCS} arcs"),
-        (f"digraph {{ {{{MANY}}} -> t_x -> {{{MANY}}} }}", 1, f"more than {ROS_GRAPH_ARCS} arcs"),
         ("/* */" * 50_000 + "x", 1, "neither DOT"),
         ("digraph { a [label=<" + "<" * 50_000 + ">] }", 1, "does not belong"),
     ],
-    ids=range(11),
+    ids=range(9),
 )
 def test_what_is_no_graph_is_told_with_its_place(tmp_path: Path, text: str, line: int, said: str) -> None:
     with pytest.raises(Rejected, match=said) as told:

@@ -179,19 +179,9 @@ def test_did_you_mean(tmp_path: Path) -> None:
         assert faults(tmp_path, source.replace("KIND", kind))[0].hint == hint
 
 
-def test_billion_laughs_is_bounded() -> None:
-    lines = ["a0: &a0 [x, x, x, x, x, x, x, x, x, x]"]
-    lines += [f"a{n}: &a{n} [{', '.join([f'*a{n - 1}'] * 10)}]" for n in range(1, 12)]
-    with pytest.raises(Rejected, match="pieces once its aliases"):
-        read_yaml("\n".join(lines).encode(), "plan.yaml")
-
-
-def test_depth_is_bounded_also_through_aliases() -> None:
-    with pytest.raises(Rejected, match="nested deeper"):
+def test_nesting_without_end_is_a_fault() -> None:
+    with pytest.raises(Rejected, match="nested too deeply"):
         read_yaml(b"[" * 5000, "plan.yaml")
-    lines = ["a0: &a0 [x]"] + [f"a{n}: &a{n} [*a{n - 1}]" for n in range(1, 3000)]
-    with pytest.raises(Rejected, match="nested deeper"):
-        read_yaml("\n".join(lines).encode(), "plan.yaml")
 
 
 def test_faults_of_what_is_repeated_have_an_order(tmp_path: Path) -> None:

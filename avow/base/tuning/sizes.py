@@ -29,9 +29,6 @@ SENTENCE = 4_000
 DIGITS = 500
 """Longer numbers are rejected: nobody means them, and arithmetic on them costs more than it is worth."""
 
-CLAUSE_PARTS = 200_000
-"""So many parts a clause may have, constants written out."""
-
 CONTRACT_BYTES = 4_000_000
 """A larger file is no contract: at forty bytes a line it has a hundred thousand lines."""
 
@@ -39,17 +36,11 @@ NESTING = 150
 """How deep a formula or type may be nested. Every later pass may recurse as deep as this. A chain of operators is
 no nesting: its terms are made shallow by `avow.language.chains`."""
 
-INCLUDED_NODES = 5_000
-"""Two copies of two copies of …: soon too many."""
-
 SYSTEMS_WITHIN = 30
 """Systems within systems: each level reads a plan, and a circle that links hide must end."""
 
 ROS_GRAPH_BYTES = 1_000_000
 """A larger file is no graph of one robot: a node with ten topics takes two thousand."""
-
-ROS_GRAPH_ARCS = 100_000
-"""Between nodes; few words of DOT can say more of them than any memory holds."""
 
 DEFINITION_BYTES = 2_000_000
 """Of one file that defines message types: the largest package's definitions together are a tenth of it."""
@@ -60,23 +51,8 @@ STATEMENT_WORDS = 14
 PLAN_BYTES = 8_000_000
 """A larger file is no plan: data belongs in a table beside it."""
 
-PLAN_PIECES = 400_000
-"""Pieces of a document after its aliases are expanded: aliases of aliases make a kilobyte into gigabytes."""
-
-PLAN_DEPTH = 60
-"""Lists within mappings within lists: what the schema allows is a tenth of it, and readers recurse."""
-
-TABLE_CELLS = 1_000_000
-"""Of one table: a map of a thousand by a thousand places."""
-
 RANGE_VALUES = 100_000
 """Of one range of numbers, which is written out."""
-
-PROPERTY_DEPTH = 60
-"""Brackets of a temporal property: its parser and its automaton recurse."""
-
-PROPERTY_LENGTH = 50_000
-"""Characters of a temporal property: one so long is generated, and no automaton of it would be built."""
 
 REPAIR_ROUNDS = 20
 """Times that the pieces of a plan at fault are dropped to look at the rest: each may leave another without what it
