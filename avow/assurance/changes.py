@@ -26,7 +26,7 @@ KINDS = (
     *("edit", "meaning", "new", "better", "rerun"),
 )
 """Worst first. ``demand``: the case asks for less, or judges a hazard otherwise; ``rerun``: with the same answer."""
-MARKS = {"open": "✘", "better": "▲", "demand": "≠", "edit": "≠", "meaning": "≠", "new": "+", "rerun": "⟲"}
+MARKS = {"open": "✘", "better": "▲", "edit": "≠", "meaning": "≠", "new": "+", "rerun": "⟲"}
 """Of the other kinds: ▼."""
 EDITED = 60
 """Characters of a formula, old or new, in a line about its edit; the row of the change has it in full."""
@@ -34,7 +34,6 @@ _FIRST = ("hazard", "requirement")
 _ABOUT = (*_FIRST, "gate", "policy", "node", "claim", "evidence")
 _LEVELS = [level.value for level in reversed(Level)]
 _STATUSES = [status.value for status in sorted(Status, key=lambda status: status.rank)]
-_REFUTED = (Status.REFUTED, Status.CONTRADICTORY)
 _LOST = ("open", "gone", "demand", "weaker")
 
 
@@ -78,8 +77,8 @@ def compare(old: State, new: State) -> tuple[ChangeLine, ...]:
         place = _ABOUT.index(change.about) if change.about in _ABOUT else len(_ABOUT)
         severity = new.items.get((change.about, change.subject), {}).get("severity", ("",))[0]
         grave = SEVERITIES.index(severity) if severity in SEVERITIES else 0
-        first = change.about in _FIRST
-        return KINDS.index(change.kind), not first, change.after not in _REFUTED, place, grave
+        refuted = change.after in (Status.REFUTED, Status.CONTRADICTORY)
+        return KINDS.index(change.kind), change.about not in _FIRST, not refuted, place, grave
 
     return tuple(sorted(found, key=order))
 

@@ -14,7 +14,7 @@ from avow.assurance.naming import requirement_claim
 from avow.assurance.relied import Relied, differs
 from avow.base.records import dataclass
 from avow.evidence.claims import Standing
-from avow.evidence.obligation import Kind, ProgramClaim
+from avow.evidence.obligation import Kind
 
 _TOGETHER = (".persistence", ".one-output")
 
@@ -111,10 +111,11 @@ class Closure:
         return (), ()
 
     def _differing(self, view: ObligationView) -> Iterator[str]:
-        """The refuted claim that a node's program agrees with the model that a guarantee rests on."""
-        relied, o = self.relied.get(view.id), view.obligation
-        if relied is not None and differs(self.programs, o, relied.record):
-            yield self.local[f"{o.node}/{Kind.PROGRAM}/{ProgramClaim.LINKED}"]
+        """The refuted claim by which a node's program differs from the model that a guarantee rests on."""
+        relied = self.relied.get(view.id)
+        claim = differs(self.programs, view.obligation, relied.record) if relied else None
+        if claim is not None:
+            yield claim.id
 
     def _discharged(self, assumptions: Sequence[str], found: list[str]) -> tuple[tuple[str, ...], tuple[str, ...]]:
         lost = []

@@ -43,14 +43,12 @@ from avow.assurance.relied import (
 from avow.assurance.summary import refutation
 from avow.base.plain import count, listed
 from avow.evidence.obligation import SYSTEM_LEVEL, Kind
-from avow.evidence.status import Status
 from avow.system.statements import GENERAL
 
 ROWS, WORST, NODES, SQUARES, LINES, OWNERS, REASON = 6, 3, 8, 12, 3, 3, 72
 """The most requirements that have a row each; else the number of the worst, and of refutations; nodes; squares for a
 node; changes; owners; characters of a counterexample."""
 _FELLED = (Kind.GUARANTEE, Kind.REQUIREMENT, Kind.COMPOSITION, Kind.PROGRAM, Kind.SANITY, Kind.WELL_FORMED)
-_WRONG = (Status.REFUTED, Status.CONTRADICTORY)
 _WORST_FIRST = tuple(reversed(Level))
 _rank = attrgetter("rank")
 
@@ -220,7 +218,7 @@ def _basis(
 ) -> tuple[NodeBasis, tuple[int, float]]:
     """A node's line, and how weak it is: its worst colour, then the share with that colour. `views`: the node's."""
     own = [v for v in views if v.obligation.kind is Kind.GUARANTEE]
-    others = [v for v in views if v.obligation.kind is not Kind.GUARANTEE and v.status in _WRONG and not v.advice]
+    others = [v for v in views if v.obligation.kind is not Kind.GUARANTEE and v.status.refuted and not v.advice]
     marks = [(_mark(view, relied), view) for view in own]
     by_object: dict[str, Counter[str]] = {}
     for (said, _), view in marks:
@@ -267,7 +265,7 @@ def _refuted(
 ) -> str:
     """The refutations with their counterexamples, and the requirements that do not hold: one for each node and one for
     the whole system, a guarantee before the claims that rest on it. Empty if nothing is refuted."""
-    wrong = [v for v in views if v.status in _WRONG and not v.advice]
+    wrong = [v for v in views if v.status.refuted and not v.advice]
     if not wrong:
         return ""
     titles = {node.name: node.title for node in nodes}

@@ -14,7 +14,6 @@ from avow.assurance.naming import requirement_claim
 from avow.assurance.relied import Opinion, Relied, relied_upon, weakness
 from avow.assurance.requirement_views import failing_of, is_bounded, level_of
 from avow.evidence.obligation import Kind
-from avow.evidence.status import Status
 from avow.system.plan import Hazard
 
 
@@ -66,7 +65,7 @@ def hazard_views(
         closed = closure.of(own)
         mine = [s for s in supposed if not set(closed.claims).isdisjoint(s.where)]
         taken = {name: one for name, one in {**relied, **by}.items() if name not in own or name in by}
-        if any(views[name].standing in (Status.REFUTED, Status.CONTRADICTORY) for name in own):
+        if any(views[name].standing.refuted for name in own):
             return Level.REFUTED, Tone.RED
         if not own or closed.failing or any(name not in taken for name in own) or any(s.expired for s in mine):
             return Level.NOT_SHOWN, Tone.RED

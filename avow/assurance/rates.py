@@ -5,12 +5,12 @@ from __future__ import annotations
 import functools
 from collections.abc import Iterable, Mapping
 from dataclasses import field
-from decimal import ROUND_CEILING, ROUND_FLOOR, ROUND_HALF_EVEN, Context, Decimal
 from fractions import Fraction
 from typing import TYPE_CHECKING
 
 from avow.assurance.naming import short
 from avow.base.codec import LATER, Unreadable, from_json
+from avow.base.percent import at_least, at_most, percent
 from avow.base.plain import count, decimal, listed
 from avow.base.records import dataclass
 from avow.base.verdict import Verdict
@@ -59,8 +59,8 @@ class RateView:
         """The text beside the level. A bound is rounded up, a confidence down."""
         if not self.bound or Fraction(self.bound) >= 1:
             return NO_RATE
-        sure = f", at {percent(self.confidence, ROUND_FLOOR)} confidence" if Fraction(self.confidence) < 1 else ""
-        return f"at most {percent(self.bound, ROUND_CEILING)} of {self.trial}s fail{sure}"
+        sure = f", at {at_least(self.confidence)} confidence" if Fraction(self.confidence) < 1 else ""
+        return f"at most {at_most(self.bound)} of {self.trial}s fail{sure}"
 
     @property
     def words(self) -> str:
@@ -163,12 +163,6 @@ def sample(record: Evidence) -> tuple[Stratum, ...]:
         return strata if all(0 <= Fraction(s.bound) <= 1 and Fraction(s.confidence) < 1 for s in strata) else ()
     except (Unreadable, ValueError, ZeroDivisionError):
         return ()
-
-
-def percent(part: str, rounding: str = ROUND_HALF_EVEN) -> str:
-    """``25.8 %`` for ``0.258``, to three digits."""
-    value = Context(prec=3, rounding=rounding).create_decimal(Decimal(part) * 100)
-    return f"{value.normalize():f} %"
 
 
 def _decimal(value: Fraction) -> str:

@@ -9,10 +9,10 @@ a model leaves out.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
 from typing import TYPE_CHECKING
 
 from avow.assurance.answers import Tone
+from avow.base.percent import at_least, at_most
 from avow.base.plain import count
 from avow.base.records import dataclass
 from avow.base.verdict import HypothesisKind, Isolation, Object, in_words
@@ -74,7 +74,7 @@ def relied_upon(view: ObligationView, opinion: Opinion, views: Iterable[Obligati
         way = relied_of(record, status)
         thought = [opinion(record.method, text) for text in way.assumptions]
         badness = (
-            any(t.expired for t in thought) or differs(views, view.obligation, record),
+            any(t.expired for t in thought) or differs(views, view.obligation, record) is not None,
             status not in EXHAUSTIVE,
             outdone,
             not all(t.owned for t in thought),
@@ -122,19 +122,29 @@ def looked_at(relied: Relied) -> Object | None:
 def agrees(views: Iterable[ObligationView], guarantee: Obligation, method: str) -> Status | None:
     """The status of the claim that the node's program agrees with the model by which a method supports a guarantee;
     None if it was not compared with that model, or not in the outputs that the guarantee is about."""
-    for view in views:
-        o = view.obligation
-        if (o.kind, o.name, o.node) == (Kind.PROGRAM, ProgramClaim.LINKED, guarantee.node):
-            compared = [r.details.get(AGREES) for r in view.records if weigh(r).support]
-            same = any(isinstance(c, Mapping) and guarantee.name in c.get(method, ()) for c in compared)
-            return view.standing if same or not view.standing.supports else None
-    return None
+    compared = _comparison(views, guarantee, method)
+    return compared.standing if compared else None
 
 
-def differs(views: Iterable[ObligationView], guarantee: Obligation, record: Evidence) -> bool:
-    """Whether a record is of a model that the node's program is known to differ from."""
-    refuted = (Status.REFUTED, Status.CONTRADICTORY)
-    return record.of is Object.MODEL and agrees(views, guarantee, record.method) in refuted
+def differs(views: Iterable[ObligationView], guarantee: Obligation, record: Evidence) -> ObligationView | None:
+    """The refuted claim by which the node's program is known to differ from the model that a record is of."""
+    compared = _comparison(views, guarantee, record.method) if record.of is Object.MODEL else None
+    return compared if compared and compared.standing.refuted else None
+
+
+def _comparison(views: Iterable[ObligationView], guarantee: Obligation, method: str) -> ObligationView | None:
+    """The claim that decides whether the program agrees with a method's model. A program that fails where its
+    assumptions hold gives no answer there, and its model gives one."""
+    of_program = (v for v in views if v.obligation.kind is Kind.PROGRAM and v.obligation.node == guarantee.node)
+    claims = {view.obligation.name: view for view in of_program}
+    faultless, linked = claims.get(ProgramClaim.FAULTLESS), claims.get(ProgramClaim.LINKED)
+    if faultless and faultless.standing.refuted:
+        return faultless
+    if linked is None:
+        return None
+    compared = [r.details.get(AGREES) for r in linked.records if weigh(r).support]
+    same = any(isinstance(c, Mapping) and guarantee.name in c.get(method, ()) for c in compared)
+    return linked if same or not linked.standing.supports else None
 
 
 def examined(relied: Relied, link: Status | None = None) -> str:
@@ -195,7 +205,7 @@ def weakness(relied: Relied) -> tuple[int, float, int]:
 def bound_of(relied: Relied) -> str:
     """The number by which samples are ordered, as in ``bound 13 %``; empty if it is no sample."""
     bound = upper_bound(relied.record)
-    told = "no bound" if bound is None else f"bound {_rounded(bound, ROUND_CEILING)}"
+    told = "no bound" if bound is None else f"bound {at_most(bound)}"
     return told if relied.status in SAMPLED else ""
 
 
@@ -244,14 +254,8 @@ def _at_most(record: Evidence, trials: str) -> str:
     if bound is None:
         return ", with no bound on failures"
     if isinstance(confidence, int | float) and not isinstance(confidence, bool):
-        sure = f"{_rounded(float(confidence), ROUND_FLOOR)} confidence"
+        sure = f"{at_least(confidence)} confidence"
     else:
         sure = "confidence not recorded"
     of = "" if RATE in record.details else f" of {trials} drawn like these"
-    return f" ({sure}: at most {_rounded(bound, ROUND_CEILING)}{of} fail)"
-
-
-def _rounded(part: float, way: str) -> str:
-    """In percent, to two digits. A bound is rounded up, as a smaller number would be no bound; a confidence down."""
-    value = Context(prec=2, rounding=way).create_decimal(Decimal(str(part)) * 100)
-    return f"{value.normalize():f} %"
+    return f" ({sure}: at most {at_most(bound)}{of} fail)"

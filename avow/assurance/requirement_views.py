@@ -68,7 +68,7 @@ def held(
     fails = not view.status.supports or closed.failing or view.unknown_names or expired
     level = level_of(closed.claims, views, relied) if view.formal else Level.ARGUED
     level = Level.NOT_SHOWN if fails or not view.validated else level
-    if view.status in (Status.REFUTED, Status.CONTRADICTORY):
+    if view.status.refuted:
         level = Level.REFUTED
     bounded = any(views[n].status is not Status.PROVED for n in view.obligations) or is_bounded(closed.claims, relied)
     rate = rate_of(view.obligations, closed.claims, views)
@@ -136,7 +136,7 @@ def failing_of(
     """The failing claim below an open requirement or hazard, in place of the weakest evidence: what refutes one of its
     `own` claims; else of several a guarantee first, then the worst."""
     statuses = {name: views[name].status for name in failing if name in views}
-    own = [name for name in own if statuses.get(name) in (Status.REFUTED, Status.CONTRADICTORY)]
+    own = [name for name in own if name in statuses and statuses[name].refuted]
     own = own or [name for name in statuses if views[name].obligation.kind is Kind.GUARANTEE]
     for name in worst_first(own or statuses, statuses)[:1]:
         o, status = views[name].obligation, statuses[name].value

@@ -10,8 +10,9 @@ from avow.assurance.hazards import HazardView
 from avow.assurance.model import Gate, ObligationView, RequirementView, Suggestion
 from avow.assurance.naming import requirement_claim
 from avow.assurance.policy import CRITICALITIES, Policy
-from avow.assurance.rates import exceeds, percent
+from avow.assurance.rates import exceeds
 from avow.assurance.standards import StandardView, State
+from avow.base.percent import percent
 from avow.base.plain import count, listed
 from avow.evidence.obligation import Kind
 

@@ -9,17 +9,16 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import field, replace
-from decimal import ROUND_CEILING
 from typing import Any
 
 from avow.assurance.answers import Baseline
 from avow.assurance.model import Case, Currency, EvidenceView, Gate, ObligationView, RequirementView
 from avow.assurance.policy import Policy
-from avow.assurance.rates import percent
 from avow.assurance.relied import judgements, upper_bound
 from avow.base.codec import canonical, to_json
 from avow.base.diagnostics import Span
 from avow.base.files import sha256
+from avow.base.percent import at_most
 from avow.evidence.ledger import Entry
 from avow.evidence.obligation import Kind
 from avow.evidence.record import Evidence
@@ -227,7 +226,7 @@ def shown_by(values: Mapping[str, Value]) -> str:
     told = {name: value[0] for name, value in values.items()}
     parts = [f"{told['verdict']} ({told['object']})" if "object" in told else told["verdict"]]
     parts += [f"{told['judged']} judged"] if "judged" in told else []
-    parts += [f"at most {percent(told['bound'], ROUND_CEILING)} fail"] if "bound" in told else []
+    parts += [f"at most {at_most(told['bound'])} fail"] if "bound" in told else []
     return ", ".join(parts)
 
 

@@ -54,6 +54,11 @@ class Status(StrEnum):
         return self in _SUPPORTING
 
     @property
+    def refuted(self) -> bool:
+        """Whether something refutes the claim."""
+        return self in (Status.REFUTED, Status.CONTRADICTORY)
+
+    @property
     def rank(self) -> int:
         """Greater is better; a total order, used to find the weakest and for nothing that needs commensurability."""
         return _RANK[self]

@@ -217,7 +217,7 @@ class Facts:
             bound = sum((max(Fraction(s["bound"]) for s in leaf) for leaf in leaves), Fraction(0))
             sure = 1 - sum((1 - Fraction(s["confidence"]) for s in strata), Fraction(0))
             what = f"{strata[0].get('trial', 'step')}s"
-            told = f"at most {_percent(bound, ROUND_CEILING, 3)} of {what} fail, at {_percent(sure, ROUND_FLOOR, 3)}"
+            told = f"at most {_percent(bound, ROUND_CEILING)} of {what} fail, at {_percent(sure, ROUND_FLOOR)}"
             if told == words and all(_sampled(s) for s in strata):
                 return told
         return "none" if not found else "another rate"
@@ -298,7 +298,7 @@ def _weakness(record: Json) -> tuple[int, float]:
 def _told(record: Json) -> str:
     """``tested, bound 13 %``."""
     bound = _upper(record)
-    shown = "no bound" if bound is None else f"bound {_percent(Fraction(str(bound)), ROUND_CEILING, 2)}"
+    shown = "no bound" if bound is None else f"bound {_percent(Fraction(str(bound)), ROUND_CEILING)}"
     return f"{support(record)}, {shown}" if support(record) in _SAMPLED else support(record)
 
 
@@ -330,13 +330,13 @@ def _seen(record: Json) -> Iterator[str]:
         whole = "worst stratum" in bound or not _is(sure) or not isinstance(failed, int)
         if not whole and known < _STRICT * upper(failed, trials, sure):
             return  # it says more than its sample shows
-        told = f"{_percent(Fraction(str(sure)), ROUND_FLOOR, 2)} confidence" if _is(sure) else "confidence not recorded"
+        told = f"{_percent(Fraction(str(sure)), ROUND_FLOOR)} confidence" if _is(sure) else "confidence not recorded"
         drawn = (
             ""
             if "rate" in record["details"]
             else f" of {'runs' if isinstance(runs, int) else 'cases'} drawn like these"
         )
-        most = f" ({told}: at most {_percent(Fraction(str(known)), ROUND_CEILING, 2)}{drawn} fail)"
+        most = f" ({told}: at most {_percent(Fraction(str(known)), ROUND_CEILING)}{drawn} fail)"
     if isinstance(runs, int):
         hit = runs if hit is None else hit
         of = _count(runs, "run") if hit == runs else f"{_count(hit, 'triggered run')} of {runs}"
@@ -379,9 +379,9 @@ def upper(failures: int, trials: int, confidence: float) -> float:
     return low
 
 
-def _percent(part: Fraction, way: str, digits: int) -> str:
+def _percent(part: Fraction, way: str) -> str:
     exact = Decimal(part.numerator * 100) / Decimal(part.denominator)
-    return f"{Context(prec=digits, rounding=way).create_decimal(exact).normalize():f} %"
+    return f"{Context(prec=3, rounding=way).create_decimal(exact).normalize():f} %"
 
 
 def _is(value: object) -> bool:

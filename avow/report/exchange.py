@@ -192,8 +192,7 @@ def _result(view: ObligationView, case: Case, rules: list[str]) -> dict[str, Any
         "properties": {
             "obligation": o.id,
             "digest": o.digest,
-            "status": view.status.value,
-            "standing": view.standing.value,
+            "status": view.standing.value,
         },
     }
     location: dict[str, Any] = {"logicalLocations": [{"fullyQualifiedName": o.id, "kind": "declaration"}]}

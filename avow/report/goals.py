@@ -331,7 +331,7 @@ class _Argument:
                     of.claim,
                     tuple(s.name for s in found),
                     undeveloped=not found,
-                    defeated=view.status is Status.REFUTED,
+                    defeated=view.status.refuted,
                     unsupported=not view.standing.supports,
                     label=f"{'' if own else f'{of.node}: '}{of.name} [{view.standing}]",
                 )

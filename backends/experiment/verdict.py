@@ -8,10 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
-from decimal import ROUND_CEILING, Context, Decimal
 from fractions import Fraction
 from typing import Any
 
+from avow.base.percent import at_most
 from avow.base.plain import count, decimal, listed
 from avow.base.records import dataclass
 from avow.base.verdict import Counterexample, Outcome, Verdict
@@ -210,7 +210,7 @@ def _seen(sample: _Sample, runs: int, alike: str) -> str:
 
 def _most(sample: _Sample, experiment: Experiment) -> str:
     """``at most 16.2 % fail at 95 % confidence``."""
-    most = f"at most {_percent_up(sample.bound)} fail at {_percent(experiment.confidence)} confidence"
+    most = f"at most {at_most(sample.bound)} fail at {_percent(experiment.confidence)} confidence"
     if len(sample.strata) == 1:
         return most
     worst = sample.worst
@@ -325,9 +325,3 @@ def _decimal(value: Fraction) -> str:
 def _percent(value: Fraction) -> str:
     """Four decimals, never rounded up."""
     return f"{decimal(Fraction(value * 10**6 // 1, 10**4))} %"
-
-
-def _percent_up(value: Fraction) -> str:
-    """Three digits, never rounded down, as the rate of a requirement has them."""
-    up = Context(prec=3, rounding=ROUND_CEILING)
-    return f"{up.divide(Decimal(100 * value.numerator), Decimal(value.denominator)).normalize():f} %"

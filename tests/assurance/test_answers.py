@@ -581,7 +581,7 @@ def test_deficits_are_of_all_that_the_page_shows() -> None:
             Verdict.TESTED,
             "experiment",
             {"runs": 47, "failures": 0, "failure probability at most": 0.0617, "confidence": 0.95},
-            "47 runs, 0 failed (95 % confidence: at most 6.2 % fail)",
+            "47 runs, 0 failed (95 % confidence: at most 6.17 % fail)",
         ),
         (
             Verdict.TESTED,
@@ -595,14 +595,14 @@ def test_deficits_are_of_all_that_the_page_shows() -> None:
             {"cases": 300, "triggered": 4, "failure_probability_when_triggered_below": 0.527, "confidence": 0.95},
             (
                 "only 4 of 300 cases met its condition, none failed (95 % confidence: "
-                "at most 53 % of cases drawn like these fail)"
+                "at most 52.7 % of cases drawn like these fail)"
             ),
         ),
         (
             Verdict.TESTED,
             "hypothesis",
             {"cases": 9, "failure_probability_below": 0.3, "confidence": 0.997},
-            "9 cases, none failed (99 % confidence: at most 30 % of cases drawn like these fail)",
+            "9 cases, none failed (99.7 % confidence: at most 30 % of cases drawn like these fail)",
         ),
         (
             Verdict.MONITORED,

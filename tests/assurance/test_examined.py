@@ -8,7 +8,7 @@ from assurance.sample import case, evidence, guarantee, node_plan, obligation, s
 from avow.assurance.answers import MODELS, TOOLS, Level
 from avow.assurance.model import Case, Gate
 from avow.base.verdict import Object, Verdict
-from avow.evidence.obligation import Kind, ProgramClaim
+from avow.evidence.obligation import Kind, Obligation, ProgramClaim
 from avow.evidence.record import Evidence
 from avow.system.plan import Requirement
 
@@ -51,17 +51,21 @@ def test_the_program_agrees_with_a_model_that_it_was_compared_with(compared: dic
     assert words(unknown, MODEL) == "1 proved (model; program agrees: unknown)"
 
 
-def test_a_model_that_the_program_refutes_shows_nothing() -> None:
+@pytest.mark.parametrize("wrong", [LINKED, FAULTLESS])
+def test_a_model_that_the_program_refutes_shows_nothing(wrong: Obligation) -> None:
+    """A program that fails differs from its model as well, although it agreed wherever both answered."""
     asked = [Requirement("R", "It is safe.", None, None, ("n.g",))]
     plans = [node_plan("n", "medium", "hoare", "hypothesis")]
     whole = system({"n": ["g"]}, plans=plans, requirements=asked, policy={"programs": []})
-    refuted = evidence(LINKED, Verdict.REFUTED, "hypothesis")
-    levels = {Level.ARGUED: [MODEL], Level.NOT_SHOWN: [MODEL, refuted]}
+    agreed = evidence(LINKED, Verdict.TESTED, "hypothesis", details={"agrees": {"hoare": ["g"]}})
+    refuted = evidence(wrong, Verdict.REFUTED, "hypothesis")
+    levels = {Level.ARGUED: [MODEL, agreed], Level.NOT_SHOWN: [MODEL, *([agreed] * (wrong is FAULTLESS)), refuted]}
     for level, records in levels.items():
-        found = case(whole, [G, LINKED], records)
+        found = case(whole, [G, LINKED, FAULTLESS], records)
         assert found.requirements[0].level is level
         assert any(a.key == MODELS for a in found.assumptions) is (level is not Level.NOT_SHOWN)
-    assert case(whole, [G, LINKED], [MODEL, refuted, TESTED]).requirements[0].level is Level.ARGUED
+        assert ("program agrees: refuted" in found.answers.bases[0].words) is (level is Level.NOT_SHOWN)
+    assert case(whole, [G, LINKED, FAULTLESS], [MODEL, refuted, TESTED]).requirements[0].level is Level.ARGUED
 
 
 def test_a_reviews_condition_is_a_numbered_assumption() -> None:

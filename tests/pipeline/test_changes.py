@@ -78,10 +78,10 @@ def test_nothing_changed_after_signing(signed: Path) -> None:
 
 
 EDITS = [
-    ("plan.yaml", "cases: 20", "cases: 1", "≠ policy, guarantees.medium.cases: 20 → 1", 1),
-    ("plan.yaml", "[tested]", "[tested, justified]", "≠ policy, guarantees.medium.one_of: also justified", 1),
+    ("plan.yaml", "cases: 20", "cases: 1", "▼ policy, guarantees.medium.cases: 20 → 1", 1),
+    ("plan.yaml", "[tested]", "[tested, justified]", "▼ policy, guarantees.medium.one_of: also justified", 1),
     ("plan.yaml", "cases: 40}}]}\n  m", "cases: 30}}]}\n  m", "▼ n.g by hypothesis: tested (model), 40 judged", 1),
-    ("plan.yaml", "n: {criticality: medium", "n: {criticality: low", "≠ node n, criticality: medium → low", 1),
+    ("plan.yaml", "n: {criticality: medium", "n: {criticality: low", "▼ node n, criticality: medium → low", 1),
     ("plan.yaml", "nodes:", "# why\nnodes:", "≠ contracts/s/plan.yaml:12: (nothing) → # why", 0),
     ("models/n.py", "min(x, 1)", "min(1, x)", "≠ contracts/s/models/n.py changed: 1 claim re-run, same verdict", 0),
     ("k.yaml", "most: 1.0", "most: 1.5", "≠ contracts/s/k.yaml:2: most: 1.0 → most: 1.5", 0),

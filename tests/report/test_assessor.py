@@ -288,7 +288,7 @@ def test_all_formats_count_alike(found: Case) -> None:
     assert Counter(v["standing"] for v in data["obligations"]) == standing
     assert Counter(re.findall(r'class="ob"[^>]*data-status="([^"]+)"', made["claims.html"])) == standing
     results = json.loads(made["report.sarif"])["runs"][0]["results"]
-    assert Counter(r["properties"]["standing"] for r in results) == standing
+    assert Counter(r["properties"]["status"] for r in results) == standing
     holding = sum(v.standing.supports for v in found.obligations)
     assert len(json.loads(made["findings.sarif"])["runs"][0]["results"]) == len(found.obligations) - holding
     reasons = sum(v.standing.supports and v.status is Status.JUSTIFIED for v in found.obligations)
