@@ -226,22 +226,32 @@ def _metadata(path: Path) -> str:
     return ""
 
 
+_RECOVERED = {
+    ".db3": "sqlite3 {0} .recover | sqlite3 whole.db3",
+    ".mcap": "mcap recover {0} -o whole.mcap",
+    ".bag": "rosbag reindex {0}",
+}
+
+
 @contextmanager
 def _readable(path: Path) -> Iterator[None]:
+    import apsw  # rosbags reads sqlite3 by it, and passes its errors on
     from rosbags.highlevel import AnyReaderError
     from rosbags.serde import SerdeError
     from rosbags.typesys import TypesysError
 
     try:
         yield
-    except (AnyReaderError, SerdeError, OSError, ValueError, KeyError, RuntimeError, TypesysError) as error:
+    except (AnyReaderError, SerdeError, OSError, ValueError, KeyError, RuntimeError, TypesysError, apsw.Error) as error:
         why, hint = str(error), None
+        files = sorted(path.iterdir()) if path.is_dir() else [path]
+        stored = next((each for each in files if each.suffix in _RECOVERED), None)
         if "type definition" in why:
             hint = "the bag holds no definitions: name the distribution, `ros: {distro: humble}`, and `messages:`"
-        if "magic" in why or "malformed" in why:
-            hint = "it was cut off: `mcap recover` or `ros2 bag reindex` restores the messages that are whole"
-            if "storage_identifier: mcap" in _metadata(path) and (stored := sorted(path.glob("*.db3"))):
-                hint = f"metadata.yaml says mcap, and {stored[0].name} is sqlite3: correct its storage_identifier"
+        elif stored:
+            hint = f"if it was cut off, `{_RECOVERED[stored.suffix].format(stored)}` restores its whole messages"
+            if stored.suffix == ".db3" and "storage_identifier: mcap" in _metadata(path):
+                hint = f"metadata.yaml says mcap, and {stored.name} is sqlite3: correct its storage_identifier"
         if path.is_dir() and not (path / "metadata.yaml").exists():
             why, hint = (
                 "its folder has no metadata.yaml",

@@ -250,7 +250,9 @@ def _launched(plan: Plan, node: Node, mine: Placed, faults: list[Diagnostic]) ->
             message = f"ros.nodes.{node.name}.name: no launch file starts {mine.name}"
             sure = not plan.launched.unread
             severity = Severity.ERROR if sure else Severity.WARNING
-            faults.append(Diagnostic("ROS122", message, mine.span, severity, suggest(mine.name, names)))
+            near = nearest(mine.name, names) or names[:3]
+            notes = tuple((f"{s.name} is started here", s.span) for s in every if s.name in near)
+            faults.append(Diagnostic("ROS122", message, mine.span, severity, suggest(mine.name, names), notes))
     else:
         found = [s for s in every if s.name.rpartition("/")[2] == node.name]
     if len({(s.name, s.remaps) for s in found}) > 1:

@@ -212,6 +212,21 @@ def test_a_bag_without_its_metadata_wants_it(form: str, tmp_path: Path) -> None:
     assert f"ros2 bag reindex {bag}" in (fault.hint or "")
 
 
+@pytest.mark.parametrize(
+    ("form", "remedy"), [("sqlite3", "sqlite3"), ("mcap", "mcap recover"), ("ros1", "rosbag reindex")]
+)
+@pytest.mark.parametrize("share", [0, 0.01, 0.5, 0.99])
+def test_a_bag_that_was_cut_off_says_what_restores_it(form: str, remedy: str, share: float, tmp_path: Path) -> None:
+    bag = make_bag(tmp_path / "run", form)
+    file = bag if bag.is_file() else next(each for each in bag.iterdir() if each.suffix in (".db3", ".mcap"))
+    whole = file.read_bytes()
+    file.write_bytes(whole[: int(len(whole) * share)])
+    with pytest.raises(Rejected) as caught:
+        CliRunner().invoke(init, [str(tmp_path / "w"), "--from-bag", str(bag)], catch_exceptions=False)
+    (fault,) = caught.value.diagnostics
+    assert f"`{remedy} {file}" in (fault.hint or "")
+
+
 @pytest.mark.parametrize("text", ["", "a -> b", "/a\n  Publishers:\n", '{"/a": {"publishers": {"/t\\nx": "a/B"}}}'])
 def test_what_is_no_graph_drafts_nothing(tmp_path: Path, text: str) -> None:
     (tmp_path / "graph.txt").write_text(text, encoding="utf-8")

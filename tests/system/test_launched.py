@@ -84,6 +84,7 @@ def test_what_does_not_agree_is_told(tmp_path: Path, plan: str, launch: str, cod
         found = rejected.diagnostics
     assert [d.code for d in found] == codes
     assert all(d.span is not None for d in found)
+    assert all(d.notes for d in found if d.code == "ROS122"), "the launch file's line"
     printed = avow("check", "contracts/s", cwd=tmp_path).stdout
     assert re.findall(r"^\w+\[(ROS12[023])\]", printed, re.MULTILINE) == codes, "each once, and nothing that follows"
 
