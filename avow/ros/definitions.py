@@ -286,9 +286,9 @@ def parse_parts(text: str, name: str, kind: str, source: str = "") -> tuple[Mess
     parts = [part.split("\n")[1:] for part in re.split(r"\n[ \t]*---[ \t]*(?=\n)", "\n".join(["", *lines, ""]))]
     wanted = _PARTS[kind]
     if len(parts) != len(wanted):
-        raise WrongDefinition(
-            f"a .{kind} has {len(wanted)} parts, set apart by ---; this has {len(parts)}", len(lines) or 1
-        )
+        rule = re.compile(r"\s*(?!---\s*$)[-=_*—–]+\s*")  # a line that was meant to be `---`
+        at = next((at for at, line in enumerate(lines, 1) if rule.fullmatch(line)), len(lines) or 1)
+        raise WrongDefinition(f"a .{kind} has {len(wanted)} parts, set apart by `---`; this has {len(parts)}", at)
     found: list[Message] = []
     before = 0
     for part, suffix in zip(parts, wanted, strict=True):

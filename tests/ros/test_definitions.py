@@ -93,6 +93,9 @@ def test_services_and_actions_are_their_parts() -> None:
     ]
     with pytest.raises(WrongDefinition, match="2 parts"):
         parse_parts("int32 a", "p/Do", "srv")
+    with pytest.raises(WrongDefinition, match="2 parts") as caught:
+        parse_parts("int32 a\n--\nbool b\n", "p/Do", "srv")
+    assert caught.value.line == 2, "the line that was meant to set them apart"
     with pytest.raises(WrongDefinition) as caught:
         parse_parts("int32 a\n---\n? b", "p/Do", "srv")
     assert caught.value.line == 3
