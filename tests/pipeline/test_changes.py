@@ -86,7 +86,7 @@ EDITS = [
     ("models/n.py", "min(x, 1)", "min(1, x)", "≠ contracts/s/models/n.py changed: 1 claim re-run, same verdict", 0),
     ("k.yaml", "most: 1.0", "most: 1.5", "≠ contracts/s/k.yaml:2: most: 1.0 → most: 1.5", 0),
     ("n.rcl", "Top = 1", "Top = 2", "≠ contracts/s/n.rcl:1: context { Top = 1; } → context { Top = 2; }", 1),
-    ("hazards.yaml", "severity: critical", "severity: marginal", "≠ hazard H1, severity: critical → marginal", 1),
+    ("hazards.yaml", "severity: critical", "severity: marginal", "▼ hazard H1, severity: critical → marginal", 1),
     ("hazards.yaml", "[R, n.g]", "[R]", "▼ hazard H1, mitigated by: without n.g", 1),
 ]
 
