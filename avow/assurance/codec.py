@@ -34,7 +34,9 @@ def read_case(path: Path) -> Case:
     try:
         return from_json(codec.parsed(read_regular(file)))
     except OSError as error:
-        raise Rejected(Diagnostic("REPORT001", f"{file} cannot be read: {error.strerror}")) from None
+        raise Rejected(
+            Diagnostic("REPORT001", f"{file} cannot be read: {error.strerror}", hint="`avow verify` writes it")
+        ) from None
     except ValueError as error:
         message = f"{file} is no report of this version of Avow: {error}"
         raise Rejected(Diagnostic("REPORT002", message, hint="`doit report` renders it again")) from None

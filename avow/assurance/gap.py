@@ -44,6 +44,7 @@ def shortfall(view: ObligationView, demand: Demand, policy: Policy, today: date)
     return next((f"{one.method} failed: {one.summary}" for one in kept if one.verdict is Verdict.ERROR), None)
 
 
+@by_identity(20_000)
 def counted(view: ObligationView, demand: Demand, policy: Policy, today: date) -> tuple[list[Evidence], list[str]]:
     """The records that count for a demand, and why others, which support the claim, do not."""
     evidence = view.records
@@ -297,13 +298,19 @@ def _backends(facts: Facts) -> Mapping[str, Mapping[str, str]]:
     return {node.name: dict(node.methods) for node in facts.nodes}
 
 
+@by_identity(1)
+def _unsuited(facts: Facts) -> Mapping[str, frozenset[str]]:
+    """Method → the nodes that it does not suit."""
+    return {info.name: frozenset(info.unsuited) for info in facts.methods}
+
+
 def _new_method(view: ObligationView, demand: Demand, used: Mapping[str, str], facts: Facts) -> Suggestion:
     strong_enough = view.status in demand.one_of
     order = costs()
-    node = view.obligation.node
+    node, unsuited = view.obligation.node, _unsuited(facts)
 
     def fits(info: MethodInfo) -> bool:
-        if info.name in used.values() or node in info.unsuited:
+        if info.name in used.values() or node in unsuited[info.name]:
             return False
         if demand.links and info.link not in demand.links and info.strength is not Verdict.REVIEWED:
             return False

@@ -176,9 +176,11 @@ def _findings(facts: Facts, findings: Sequence[Handled], obligations: Sequence[O
 
 
 def _nothing_wrong(facts: Facts, obligations: Sequence[ObligationView], excused: set[str]) -> Gate:
-    wrong = [v for v in obligations if v.status in FINDINGS and not v.advice]
-    good = f"{'nothing else' if excused else 'no claim'} is refuted, contradicted or vacuous"
-    return _gate("refuted", "Nothing is refuted, contradictory or vacuous", wrong, excused, _worded, good)
+    found = [view for view in obligations if view.status in FINDINGS]
+    wrong = [view for view in found if not view.advice]
+    but = ", but for remarks on how contracts are written" * (len(found) > len(wrong))
+    good = f"{'nothing else' if excused else 'no claim'} is refuted, contradicted or vacuous{but}"
+    return _gate("refuted", "No claim is refuted, contradictory or vacuous", wrong, excused, _worded, good)
 
 
 def _held_to(name: str, title: str, views: Sequence[ObligationView], good: Sequence[Status], excused: set[str]) -> Gate:
@@ -332,6 +334,10 @@ def _requirements(
     found = [s for r in bad for name in causes[r.id] if name in views for s in _suggestion(views[name])]
     if any(r.outdated for r in bad):
         found.append(Suggestion("read the sentence against the formula, then run `avow validate`", cost=5))
+    if any(r.too_often for r in bad):
+        found.append(
+            Suggestion("repair what fails in the trials, make more trials, or ask for a lower probability", cost=30)
+        )
     if any(not (r.formal or r.below or causes[r.id] or r.outdated) for r in bad):
         found.append(
             Suggestion("state the requirement as a `formula` or a `temporal` one: prose is argued by a person", cost=20)
@@ -366,7 +372,8 @@ def _standing(requirement: RequirementView, status: Status, good: Sequence[Statu
         return "not validated (its sentence, formula or support changed since a person read them: run `avow validate`)"
     if status not in good:
         return _short_of(status, good)
-    return "open" if requirement.failing else "open: an assumption has expired"
+    too_often = f"open: {requirement.too_often}" if requirement.too_often else "open: an assumption has expired"
+    return "open" if requirement.failing else too_often
 
 
 def _weak(

@@ -30,11 +30,15 @@ def kept_records(
     without the ledger.
     """
     digests = {o.id: o.digest for o in obligations}
+    answers = Counter((entry.evidence.obligation, entry.evidence.method) for entry in records)
     kept: set[str] = set()
     others: Counter[tuple[object, ...]] = Counter()
     for entry in reversed(records):
         record = entry.evidence
         asked = record.obligation, record.method
+        if answers[asked] <= OLDER_RECORDS:  # nearly always
+            kept.add(entry.hash)
+            continue
         current = planned.get(asked) == record.key and digests.get(record.obligation) == record.obligation_digest
         refuting = record.verdict is Verdict.REFUTED or weigh(record).refuted
         alike = (*asked, *_says(record, refuting)) if current or refuting else asked

@@ -254,6 +254,8 @@ class RequirementView:
     """Whether one of these is past its last day."""
     rate: RateView | None = field(default=None, metadata=codec.LATER)
     """How often it may fail, if it rests on samples."""
+    too_often: str = field(default="", metadata=codec.LATER)
+    """The reason why its samples do not show the probability that is asked; empty if they do, or none is asked."""
     searched: str = field(default="", metadata=codec.LATER)
     """How far its own formula or property was searched, if not exhaustively."""
     span: Span | None = None
@@ -295,7 +297,8 @@ class RequirementView:
     @property
     def awaits_validation(self) -> bool:
         """Whether only a person's validation of the sentence against the formula is missing."""
-        return not (self.level.holds or self.failing or self.unknown_names or self.expired) and self.status.supports
+        fails = self.failing or self.unknown_names or self.expired or self.too_often
+        return not (self.level.holds or fails) and self.status.supports
 
     @property
     def words(self) -> str:

@@ -21,6 +21,7 @@ from avow.kernel.rates import Leaf, Likely, Stratum, Trial, composed
 
 if TYPE_CHECKING:
     from avow.assurance.model import ObligationView
+    from avow.system.probability import Probability
 
 LEAST_CONFIDENCE = Fraction(9, 10)
 """Below it, a rate is no evidence that a policy's limit is met."""
@@ -91,14 +92,14 @@ def rate_of(own: Iterable[str], claims: Iterable[str], views: Mapping[str, Oblig
         if (view := views.get(name)) is None:
             continue
         samples = [s for record in view.records if weigh(record).support is not None and (s := sample(record))]
-        likely = any(LIKELY in record.details for record in view.records)
-        if likely or view.status in _SAMPLED or any(stratum.failures for strata in samples for stratum in strata):
+        failed = any(stratum.failures for strata in samples for stratum in strata)
+        if not (failed or view.status in _SAMPLED) and (leaf := stated.get(short(name))) is not None:
+            leaves.append(Leaf(name, (), _decimal(1 - Fraction(leaf.least)), leaf.trial))  # checked, say, of a model
+        elif failed or view.status in _SAMPLED or any(LIKELY in record.details for record in view.records):
             if samples:
                 leaves.append(Leaf(name, max(samples, key=lambda strata: max(Fraction(s.bound) for s in strata))))
             else:
                 unrated.append(name)
-        elif (leaf := stated.get(short(name))) is not None:  # checked, say, of a model
-            leaves.append(Leaf(name, (), _decimal(1 - Fraction(leaf.least)), leaf.trial))
     if not leaves and not unrated:
         return None
     proof = next((found for name in own for record in views[name].records if (found := _composes(record))), None)
@@ -145,14 +146,24 @@ def misstated(rate: RateView) -> str:
     return "" if told == (true.bound, true.confidence) else f"its samples give {float(true.bound):g}, not {rate.bound}"
 
 
-def exceeds(rate: RateView, most: str) -> str:
+def short_of(asked: Probability, rate: RateView) -> str:
+    """The reason why samples do not show a probability; empty if they do. Over several steps, each may fail (union
+    bound). Runs have the length that they have in the data: their rate bounds no other number of steps."""
+    of_runs = bool(rate.bound) and rate.trial is Trial.RUN
+    if rate.bound and of_runs is not asked.per_run and (asked.per_run or asked.steps > 1):
+        return f"a rate of {'whole runs' if asked.per_run else 'steps'} is asked; {rate.words}"
+    return exceeds(rate, (1 - Fraction(asked.at_least)) / (1 if of_runs else asked.steps))
+
+
+def exceeds(rate: RateView, most: Fraction | str) -> str:
     """The reason why a rate is not known to be within a limit; empty if it is."""
     if not rate.bound:
         return rate.words
     if Fraction(rate.bound) > Fraction(most):
-        return f"{rate.words}; at most {percent(most)} is allowed"
+        return f"at most {percent(most)} is allowed; {rate.words}"
     if Fraction(rate.confidence) < LEAST_CONFIDENCE:
-        return f"{rate.words}; a confidence of {percent(str(float(LEAST_CONFIDENCE)))} is asked of all samples together"
+        least = percent(LEAST_CONFIDENCE)
+        return f"a confidence of {least} is asked of all samples together; {rate.words}"
     return ""
 
 

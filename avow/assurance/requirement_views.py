@@ -10,7 +10,7 @@ from avow.assurance.closure import Closed
 from avow.assurance.first_screen import tone_of, weakest_of
 from avow.assurance.model import ObligationView, RequirementView
 from avow.assurance.naming import requirement_claim, short
-from avow.assurance.rates import RateView, rate_of
+from avow.assurance.rates import rate_of, short_of
 from avow.assurance.relied import Relied, looked_at, seen
 from avow.assurance.summary import worst_first
 from avow.assurance.support import Names, requirement_support
@@ -65,13 +65,14 @@ def held(
     """A requirement with its level, its colour, weakest evidence and assumptions; `titles` are the nodes'."""
     mine = [s for s in supposed if view.id in s.needed_by]
     expired = any(s.expired for s in mine)
-    fails = not view.status.supports or closed.failing or view.unknown_names or expired
+    rate = rate_of(view.obligations, closed.claims, views)
+    too_often = short_of(view.probability, rate) if view.probability and rate else ""
+    fails = not view.status.supports or closed.failing or view.unknown_names or expired or too_often
     level = level_of(closed.claims, views, relied) if view.formal else Level.ARGUED
     level = Level.NOT_SHOWN if fails or not view.validated else level
     if view.status.refuted:
         level = Level.REFUTED
     bounded = any(views[n].status is not Status.PROVED for n in view.obligations) or is_bounded(closed.claims, relied)
-    rate = rate_of(view.obligations, closed.claims, views)
     awaits = level is Level.NOT_SHOWN and not fails
     weakest = weakest_of(closed.claims, views, relied, titles)
     return replace(
@@ -85,15 +86,16 @@ def held(
         weakest_evidence=(failing_of(view.obligations, closed.failing, views, titles) if fails else None) or weakest,
         supposes=tuple(s.key for s in mine),
         rate=rate,
+        too_often=too_often,
         searched=next((seen(r) for n in view.obligations if (r := relied.get(n)) and r.status is Status.TESTED), ""),
-        answer=_with_level(view, level, rate, weakest, len(mine), awaits=awaits),
+        answer=_with_level(view, level, too_often or (rate.words if rate else ""), weakest, len(mine), awaits=awaits),
     )
 
 
 def _with_level(
     view: RequirementView,
     level: Level,
-    rate: RateView | None,
+    rate: str,
     weakest: WeakestEvidence | None,
     assumed: int,
     *,
@@ -106,7 +108,10 @@ def _with_level(
         f"The weakest evidence below it: {weakest.brief}." if weakest else "",
         view.answer,
     ]
-    parts += [f"It needs {count(assumed, 'assumption')}." if assumed else "", f"F{rate.words[1:]}." if rate else ""]
+    parts += [
+        f"It needs {count(assumed, 'assumption')}." if assumed else "",
+        f"{rate[0].upper()}{rate[1:]}." if rate else "",
+    ]
     return " ".join(part for part in parts if part)
 
 

@@ -53,7 +53,7 @@ def read_requirements(path: Path) -> tuple[Requirement, ...]:
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        raise Rejected(Diagnostic("REQS001", f"{path} is not UTF-8: {error.reason} at byte {error.start}")) from None
+        raise Rejected(Diagnostic("REQS001", f"{path} is not UTF-8 (byte {error.start}): export it as CSV")) from None
     return read_csv(text, str(path))
 
 
@@ -157,8 +157,8 @@ def _requirements(rows: Iterable[tuple[int, Mapping[str, str]]], file: str) -> t
                 supports,
                 _at(file, line),
             )
-    if faults:
-        raise Rejected(*faults)
+    if faults or not found:
+        raise Rejected(*faults or [Diagnostic("REQS002", f"{file} has no requirement below its header", _at(file, 1))])
     return tuple(found.values())
 
 

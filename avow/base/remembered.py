@@ -11,6 +11,7 @@ import dataclasses
 import enum
 import io
 import pickle
+import shutil
 import sys
 from collections.abc import Callable, Mapping
 from functools import update_wrapper
@@ -76,6 +77,43 @@ class Stretch:
         return span.file == self.file and self.first <= span.line and span.end_line <= self.end
 
 
+class Kept:
+    """Values about one place, kept from run to run: a file each, in the user's cache under the user's seal
+    (`avow.base.notes`). An edited, half-written or missing one is none."""
+
+    def __init__(self, kind: str, place: Path) -> None:
+        self.folder = cache_folder() / kind / sha256(str(place.absolute()))
+        self._used: set[Path] = set()
+
+    def get(self, name: str, mark: str) -> Any:
+        """The value that was kept with that mark, which covers everything that it was made from; else None."""
+        data, head = unsealed(self._file(name)), mark.encode()
+        if data is None or not data.startswith(head):
+            return None
+        return _Placing(io.BytesIO(data[len(head) :]), _NOWHERE).load()
+
+    def put(self, name: str, mark: str, value: object) -> None:
+        path = self._file(name)
+        with contextlib.suppress(OSError):  # with a read-only home it is made again each time
+            write(path, sealed(path, mark.encode() + _written(value, _NOWHERE)))
+
+    def tidy(self) -> None:
+        """Remove the values that were not used, and the places not used for longest."""
+        with contextlib.suppress(OSError):
+            for path in self.folder.iterdir():
+                if path not in self._used and path.suffix != PART:
+                    path.unlink()
+            places = sorted(self.folder.parent.iterdir(), key=lambda path: path.stat().st_mtime)
+            for place in places[: -SHELVES or None]:
+                shutil.rmtree(place, ignore_errors=True)
+
+    def _file(self, name: str) -> Path:
+        self._used.add(path := self.folder / sha256(name))
+        return path
+
+
+_NOWHERE = Stretch("", 0, 0)
+
 _TRUE = ""
 """In place of a digest: known facts."""
 
@@ -83,17 +121,17 @@ _TRUE = ""
 class Shelf:
     """Answers about the texts of one folder, kept from run to run.
 
-    An answer that was edited, half-written, or made by another user or other code is ignored: the file has a seal bound
-    to its place, and `given` (what every answer depends on) is part of every digest.
+    An answer that other code made is ignored: `given` (what every answer depends on) is part of every digest.
     """
 
     def __init__(self, folder: Path, *given: str) -> None:
-        self._path = cache_folder() / "shelves" / sha256(str(folder.absolute()))
+        self._place = Kept("texts", folder)
         self._given = (sys.version, *given)
-        data = unsealed(self._path)
-        self._kept: dict[str, dict[str, bytes]] = pickle.loads(data) if data is not None else {}
+        self._kept: dict[str, dict[str, bytes]] = self._place.get("all", "") or {}
         self._asked: dict[str, dict[str, bytes]] = {_TRUE: self._kept.get(_TRUE, {})}
         self._texts: dict[int, tuple[object, str, Stretch]] = {}
+        self._said: dict[tuple[str, str, str, int], object] = {}
+        """The answers of this run: contract and plan are checked after they are read, with the same answers."""
         self._new = False
 
     def digest(self, *texts: str) -> str:
@@ -104,12 +142,17 @@ class Shelf:
         """The answer of `make` for the texts with that digest, at the stretch; `what` distinguishes several answers
         with one digest. `make` uses nothing else."""
         answers = self._asked.setdefault(digest, self._kept.get(digest, {}))
+        asked = digest, what, stretch.file, stretch.first
+        if asked in self._said:
+            return cast(T, self._said[asked])
         if what in answers:
-            return cast(T, _Placing(io.BytesIO(answers[what]), stretch).load())
-        made = make()
-        with contextlib.suppress(pickle.PicklingError, RecursionError):  # too deep, or of other places, too
-            answers[what] = _written(made, stretch)
-            self._new = True
+            made = cast(T, _Placing(io.BytesIO(answers[what]), stretch).load())
+        else:
+            made = make()
+            with contextlib.suppress(pickle.PicklingError, RecursionError):  # too deep, or of other places, too
+                answers[what] = _written(made, stretch)
+                self._new = True
+        self._said[asked] = made
         return made
 
     def knows(self, digest: str) -> bool:
@@ -138,15 +181,10 @@ class Shelf:
 
     def keep(self) -> None:
         """Write the requested answers if any is new. Answers that were not requested belong to earlier texts."""
-        if not self._new:
-            return
-        self._new = False
-        with contextlib.suppress(OSError):  # with a read-only home this is repeated each time
-            write(self._path, sealed(self._path, pickle.dumps(self._asked)))
-            shelves = sorted(self._path.parent.iterdir(), key=lambda path: path.stat().st_mtime)
-            for path in shelves[: -SHELVES or None]:
-                if path.suffix != PART:
-                    path.unlink()
+        if self._new:
+            self._new = False
+            self._place.put("all", "", self._asked)
+            self._place.tidy()
 
 
 def _here(line: int, column: int, end_line: int, end_column: int) -> Span:

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 
-def nearest(name: str, known: Iterable[str], most: int = 1, *, alike: float = 0.6) -> list[str]:
+def nearest(name: str, known: Iterable[str], most: int = 1, *, alike: float = 0.65) -> list[str]:
     """The known names nearest to an unknown one, if any are near: the one that differs in case only, else up to so
     many. `alike`: the least similarity, as in `difflib`."""
     import difflib  # rarely needed and slow to import
@@ -21,7 +21,7 @@ def nearest(name: str, known: Iterable[str], most: int = 1, *, alike: float = 0.
 
 def did_you_mean(name: str, known: Iterable[str], most: int = 1) -> str | None:
     """A hint; None if no name is near. Many short names differ by one letter."""
-    return _hint(nearest(name, known, most, alike=0.6 if len(name) > 3 else 0.75))
+    return _hint(nearest(name, known, most, alike=0.65 if len(name) > 3 else 0.75))
 
 
 def suggest(name: str, known: Iterable[str]) -> str | None:
@@ -38,7 +38,7 @@ def nearby(path: Path, written: str = "") -> str | None:
     the path. Never raises."""
     above = written.rpartition("/")[0] if written else "" if path.is_absolute() else str(path.parent)
     beside = [each.name for each in path.parent.iterdir()] if path.parent.is_dir() else []
-    near = nearest(path.name, beside, alike=0.6 if len(path.name) > 3 else 0.75)
+    near = nearest(path.name, beside, alike=0.65 if len(path.name) > 3 else 0.75)
     return _hint([str(Path(above, name)) for name in near])
 
 

@@ -5,7 +5,7 @@ Names come from contracts.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 
 from avow.base.records import dataclass
 from avow.base.tuning.shown import RULE_NODES
@@ -13,25 +13,6 @@ from avow.base.verdict import Verdict
 from avow.calculus.derivation import Derivation, Goal, Rule, Settled, SideCondition
 from avow.evidence.obligation import SYSTEM_LEVEL, Kind
 from avow.system.plan import Edge
-
-
-@dataclass(frozen=True, slots=True)
-class Line:
-    """One line of a derivation. `remark` is prose."""
-
-    parts: tuple[str, ...]
-    remark: str = ""
-
-
-@dataclass(frozen=True, slots=True)
-class Lines:
-    """One rule instance as it is written."""
-
-    rule: str
-    name: str
-    above: tuple[Line, ...]
-    below: tuple[Line, ...]
-    hypotheses: tuple[str, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,8 +46,7 @@ def write_goal(goal: Goal, settled: Mapping[SideCondition, Settled] | None = Non
     if instances:
         names[id(instances[-1])] = goal.name
     inner = frozenset(part.name for part in goal.within)
-    written = [_lines(part, names, settled or {}, inner) for part in instances or [goal.root]]
-    conclusion = _conclusion(goal.root)
+    written = [_as_text(part, names, settled or {}, inner) for part in instances or [goal.root]]
     conditions = tuple(
         Condition(_condition_text(condition), f"{SYSTEM_LEVEL}/{Kind.COMPOSITION}/{goal.name}.{condition.about}")
         for condition in goal.conditions
@@ -80,8 +60,8 @@ def write_goal(goal: Goal, settled: Mapping[SideCondition, Settled] | None = Non
     return Written(
         goal.name,
         goal.root.rule.value,
-        "\n\n".join([*map(_as_text, written), *_joined(goal.contract)]),
-        _plain(conclusion.parts),
+        "\n\n".join([*written, *(["\n".join(goal.contract)] if goal.contract else [])]),
+        _conclusion(goal.root),
         tuple(dict.fromkeys(node for part in goal.root.walk() if part.rule is Rule.PREMISE for node in part.nodes)),
         conditions,
         tuple(conditional),
@@ -89,31 +69,33 @@ def write_goal(goal: Goal, settled: Mapping[SideCondition, Settled] | None = Non
     )
 
 
-# -- lines -------------------------------------------------------------------------------------------------------------
-
-
-def _joined(lines: tuple[str, ...]) -> tuple[str, ...]:
-    return ("\n".join(lines),) if lines else ()
-
-
-def _lines(
+def _as_text(
     part: Derivation, names: Mapping[int, str], settled: Mapping[SideCondition, Settled], inner: frozenset[str]
-) -> Lines:
-    above: list[Line] = []
+) -> str:
+    """One rule instance, in Unicode for a terminal or a fixed-width font."""
+    above: list[str] = []
     for child in _shortened(part.children):
         if child is None:
-            above.append(Line(("…",)))
+            above.append("…")
         elif child.rule is Rule.PREMISE:
-            above.append(_contract(child.nodes[0], "derived" if child.nodes[0] in inner else ""))
+            node = child.nodes[0]
+            above.append(_remarked(_implication((node,), (node,)), ["derived"] if node in inner else []))
             above += _condition_lines(child, settled)
-
         else:
-            conclusion = _conclusion(child)
-            above.append(Line(conclusion.parts, f"by {child.rule} ({names.get(id(child), '')})"))
+            above.append(_remarked(_conclusion(child), [f"by {child.rule} ({names.get(id(child), '')})"]))
     above += _linking(part)
     above += _condition_lines(part, settled)
-    kept = _conclusion(part)
-    return Lines(part.rule.value, names.get(id(part), ""), tuple(above), (kept,), part.hypotheses)
+    clauses = [str(name) for name in part.assumed]
+    shown = ", ".join(clauses) if len(clauses) <= 8 else f"{', '.join(clauses[:8])}, … ({len(clauses)} in all)"
+    below = _remarked(_conclusion(part), [f"assuming {shown}"] if clauses else [])
+    width = min(100, max(map(len, [*above, below])))
+    title = f"{part.rule} ({names[id(part)]})" if id(part) in names else part.rule.value
+    return "\n".join([title, *above, "─" * width, below, *(f"  provided that {h}" for h in part.hypotheses)])
+
+
+def _remarked(text: str, remarks: Iterable[str]) -> str:
+    remark = "; ".join(remarks)
+    return f"{text}    [{remark}]" if remark else text
 
 
 def _shortened(children: tuple[Derivation, ...]) -> Iterator[Derivation | None]:
@@ -125,51 +107,45 @@ def _shortened(children: tuple[Derivation, ...]) -> Iterator[Derivation | None]:
     yield from children[-3:]
 
 
-def _contract(node: str, remark: str = "") -> Line:
-    i, o = _symbol("i", node), _symbol("o", node)
-    return Line(("∀", i, ",", o, "·", *_applied("𝒜", node), "⇒", "◇", *_applied("𝒢", node)), remark)
-
-
 def _symbol(kind: str, node: str) -> str:
     """``𝒢_navigation``, ``o_navigation``; `kind` is 𝒜, 𝒢, i or o."""
     return node if node == "…" else f"{kind}_{node}"
 
 
-def _applied(kind: str, node: str) -> tuple[str, ...]:
-    return _symbol(kind, node), "(", _symbol("i" if kind == "𝒜" else "o", node), ")"
+def _assumed(nodes: Iterable[str]) -> str:
+    return " ∧ ".join(f"{_symbol('𝒜', node)}({_symbol('i', node)})" for node in nodes) or "⊤"
 
 
-def _linking(part: Derivation) -> Iterator[Line]:
+def _guaranteed(nodes: Iterable[str], sign: str = "◇") -> str:
+    return " ∧ ".join(f"{sign}{_symbol('𝒢', node)}({_symbol('o', node)})" for node in nodes) or "⊤"
+
+
+def _linking(part: Derivation) -> Iterator[str]:
     """``i_A = o_N ∪ o_R``, one line for each consumer; remarks give what the paper leaves out."""
     by_consumer: dict[str, list[Edge]] = {}
     for edge in part.linking:
         by_consumer.setdefault(edge.target.node, []).append(edge)
     for number, (consumer, edges) in enumerate(by_consumer.items()):
         if number >= RULE_NODES:
-            yield Line(("…",))
+            yield "…"
             return
-        parts: list[str] = [_symbol("i", consumer), "="]
-        for k, provider in enumerate(dict.fromkeys(edge.source.node for edge in edges)):
-            parts += ["∪", _symbol("o", provider)] if k else [_symbol("o", provider)]
-        outside = [text for text in part.outside if text.startswith(f"{consumer}.")]
+        outputs = " ∪ ".join(_symbol("o", provider) for provider in dict.fromkeys(edge.source.node for edge in edges))
         remarks = [f"{edge.source} one step before" for edge in edges if edge.delayed]
-        remarks += [f"up to {text}" for text in outside]
-        yield Line(tuple(parts), "; ".join(remarks))
+        remarks += [f"up to {text}" for text in part.outside if text.startswith(f"{consumer}.")]
+        yield _remarked(f"{_symbol('i', consumer)} = {outputs}", remarks)
 
 
-def _condition_lines(part: Derivation, settled: Mapping[SideCondition, Settled]) -> Iterator[Line]:
+def _condition_lines(part: Derivation, settled: Mapping[SideCondition, Settled]) -> Iterator[str]:
     """One line for each consumer, as in the paper; remarks say what each of its assumptions follows from."""
     consumers = tuple(dict.fromkeys(condition.consumer for condition in part.side_conditions))
     for number, consumer in enumerate(consumers):
         if number >= RULE_NODES:
-            yield Line(("…",))
+            yield "…"
             return
         conditions = [condition for condition in part.side_conditions if condition.consumer == consumer]
-        parts: list[str] = ["⊢", "("]
-        for k, provider in enumerate(dict.fromkeys(e.source.node for e in part.linking if e.target.node == consumer)):
-            parts += ["∧", *_applied("𝒢", provider)] if k else list(_applied("𝒢", provider))
-        parts += [*["⊤"] * (len(parts) == 2), "⇒", *_applied("𝒜", consumer), ")"]
-        yield Line(tuple(parts), "; ".join(_condition_remark(c, settled.get(c)) for c in conditions))
+        providers = dict.fromkeys(e.source.node for e in part.linking if e.target.node == consumer)
+        text = f"⊢ ({_guaranteed(providers, '')} ⇒ {_assumed((consumer,))})"
+        yield _remarked(text, (_condition_remark(c, settled.get(c)) for c in conditions))
 
 
 def _condition_remark(condition: SideCondition, settled: Settled | None) -> str:
@@ -188,56 +164,14 @@ def _condition_text(condition: SideCondition) -> str:
     return f"{given}{assumed} ⇒ {condition.about}"
 
 
-def _conclusion(part: Derivation) -> Line:
-    assumed = tuple(dict.fromkeys(name.node for name in part.assumed))
-    parts: list[str] = ["∀"]
-    for node in _few(assumed):
-        parts += [_symbol("i", node), ","]
-    for node in _few(part.guaranteed):
-        parts += [_symbol("o", node), ","]
-    parts[-1] = "·"
-    for k, node in enumerate(_few(assumed)):
-        parts += ["∧", *_applied("𝒜", node)] if k else list(_applied("𝒜", node))
-    parts += ["⇒"] if assumed else ["⊤", "⇒"]
-    for k, node in enumerate(_few(part.guaranteed)):
-        parts += ["∧", "◇", *_applied("𝒢", node)] if k else ["◇", *_applied("𝒢", node)]
-    clauses = [str(name) for name in part.assumed]
-    shown = ", ".join(clauses) if len(clauses) <= 8 else f"{', '.join(clauses[:8])}, … ({len(clauses)} in all)"
-    return Line(tuple(parts), f"assuming {shown}" if clauses else "")
+def _conclusion(part: Derivation) -> str:
+    return _implication(_few(tuple(dict.fromkeys(name.node for name in part.assumed))), _few(part.guaranteed))
+
+
+def _implication(assumed: tuple[str, ...], guaranteed: tuple[str, ...]) -> str:
+    symbols = [*(_symbol("i", node) for node in assumed), *(_symbol("o", node) for node in guaranteed)]
+    return f"∀ {', '.join(symbols)} · {_assumed(assumed)} ⇒ {_guaranteed(guaranteed)}"
 
 
 def _few(nodes: tuple[str, ...]) -> tuple[str, ...]:
     return nodes if len(nodes) <= 12 else (*nodes[:6], "…", *nodes[-2:])
-
-
-# -- printers ----------------------------------------------------------------------------------------------------------
-
-_SPACED = ("⇒", "∧", "∪", "=", "⊆")
-
-
-def _plain(parts: tuple[str, ...]) -> str:
-    text = ""
-    for part in parts:
-        if part in _SPACED:
-            text += f" {part} "
-        elif part in (",", "·"):
-            text += ", " if part == "," else " · "
-        elif part in ("⊢", "∀"):
-            text += f"{part} "
-        else:
-            text += part
-    return text
-
-
-def _as_text(lines: Lines) -> str:
-    """Unicode text for a terminal or a fixed-width font."""
-    above = [_remarked(_plain(line.parts), line.remark) for line in lines.above]
-    below = [_remarked(_plain(line.parts), line.remark) for line in lines.below]
-    width = min(100, max((len(line) for line in [*above, *below]), default=10))
-    title = f"{lines.rule} ({lines.name})" if lines.name else lines.rule
-    provided = [f"  provided that {hypothesis}" for hypothesis in lines.hypotheses]
-    return "\n".join([title, *above, "─" * width, *below, *provided])
-
-
-def _remarked(text: str, remark: str) -> str:
-    return f"{text}    [{remark}]" if remark else text

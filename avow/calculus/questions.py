@@ -275,13 +275,14 @@ class StartQuestion:
         graph = composition.frame.graph
         stuck = [cycle for cycle in graph.deadlocks if set(cycle) <= set(self.members)]
         if stuck:
-            shown = "; ".join(circle(cycle) for cycle in stuck)
+            shown = "; ".join(circle([n for n in cycle if n not in graph.relays]) for cycle in stuck)
+            advice = to_delay(stuck[0], graph.edges, graph.relays)
             summary = f"start-up deadlock: {shown}: each waits for the one before it"
             return Answer(
                 Verdict.REFUTED,
                 f"{summary}; declare an edge delayed, with an initial value",
                 Counterexample(explanation=summary),
-                details={"cycles": [list(cycle) for cycle in stuck], "next": to_delay(stuck[0], graph.edges)},
+                details={"cycles": [list(cycle) for cycle in stuck], "next": advice},
             )
         initials = composition.frame.initials(frozenset(self.members))
         solution = solve(initials, effort=bounds.effort, seed=bounds.seed)

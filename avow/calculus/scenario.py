@@ -5,11 +5,12 @@ The scenario restricts which values are *tried*; whether a guarantee holds for t
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Iterator, Mapping, Sequence
 from fractions import Fraction
 
 from avow.base.diagnostics import Diagnostic, Rejected, Severity
-from avow.base.plain import exact, listed
+from avow.base.plain import listed
 from avow.base.records import dataclass
 from avow.base.tuning.bounds import SMALL_TABLE, VALUES_OF_A_PORT
 from avow.base.tuning.shown import DOMAIN_VALUES
@@ -17,6 +18,7 @@ from avow.base.verdict import Hypothesis, bound
 from avow.calculus.variables import Frame, frame
 from avow.evaluation.compiler import combinations
 from avow.evaluation.evaluate import NotEvaluable, evaluate, finite_values
+from avow.formulas.finite import cell_value
 from avow.formulas.formula import free_variables
 from avow.formulas.temporal.ages import CLOCK
 from avow.formulas.temporal.clock import pace_of
@@ -203,18 +205,9 @@ class World:
         """Parses a table cell or a value in RCL notation. Raises CannotRun."""
         from avow.language.load import parse_term
 
-        if isinstance(sort, s.StringSort) and not text.startswith('"'):
-            return text
-        try:
-            if isinstance(sort, s.RealSort):
-                return exact(text)
-            if isinstance(sort, s.IntegerSort | s.NaturalSort):
-                number = int(text)
-                if number < 0 and isinstance(sort, s.NaturalSort):
-                    raise CannotRun(f"scenario: {text} is no natural number")
-                return number
-        except ValueError:
-            pass
+        if not text.startswith('"'):
+            with contextlib.suppress(ValueError):
+                return cell_value(text, sort)
         try:
             return evaluate(parse_term(text, None, self.frame.system.contract, sort=sort), {})
         except Rejected as rejected:

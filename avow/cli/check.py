@@ -15,6 +15,7 @@ from avow.base.codes import LANGUAGE, core_codes, is_lint, sections
 from avow.base.diagnostics import Diagnostic, Rejected, Severity, Span
 from avow.base.plain import count
 from avow.base.rendering import render, summary, to_sarif, told
+from avow.base.suggestions import did_you_mean
 from avow.base.workspace import system_folder
 from avow.cli.options import ContractArgument, json_option
 
@@ -29,13 +30,7 @@ if TYPE_CHECKING:
 @click.option("--sarif", is_flag=True, help="For machines: SARIF 2.1.0.")
 @click.option("--off", "off", multiple=True, metavar="CODE", help="A warning that is not wanted (may be repeated).")
 @click.option("--explain", is_flag=True, help="Below each kind of diagnostic found, what it means.")
-def command(
-    paths: tuple[Path, ...],
-    as_json: bool,
-    sarif: bool,
-    off: tuple[str, ...],
-    explain: bool,
-) -> int:
+def command(paths: tuple[Path, ...], as_json: bool, sarif: bool, off: tuple[str, ...], explain: bool) -> int:
     """Check contracts: syntax, names, types, and lints.
 
     Each SYSTEM is a system's name or folder, or an .rcl file. Files of one folder are one contract. Of a system, the
@@ -44,6 +39,12 @@ def command(
     """
     from avow import __version__
 
+    if off:
+        from avow.backend_kit.registry import every_code
+
+        if unknown := [code for code in off if code not in every_code()]:
+            near = did_you_mean(unknown[0], every_code()) or "each message shows its own, such as RCL402"
+            raise click.UsageError(f"--off: there is no code {unknown[0]}; {near}")
     found: list[Diagnostic] = []
     files = 0
     folders = dict.fromkeys(path for path in paths if (path / "plan.yaml").is_file())

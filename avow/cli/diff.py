@@ -149,7 +149,8 @@ def _checkout(place: Workspace, revision: str, folder: Path) -> None:
         git.write_files(place.root, revision, place.contracts.name, folder)
     except (git.GitFailed, OSError) as error:
         message = f"'{revision}' is no report, ledger, signature, workspace or revision here: {error}"
-        raise Rejected(Diagnostic("DIFF001", message)) from None
+        hint = "`avow verify` writes reports/, and `avow sign --report SYSTEM` signed/"
+        raise Rejected(Diagnostic("DIFF001", message, hint=hint)) from None
 
 
 def _of_contracts(contracts: Workspace, place: Workspace) -> dict[str, State]:

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.files import write
-from avow.base.suggestions import did_you_mean
+from avow.base.suggestions import nearest
 from avow.base.tuning.running import DRAFT_MESSAGES
 from avow.base.tuning.sizes import ROS_GRAPH_BYTES
 from avow.language.format import format_text
@@ -20,37 +20,38 @@ from avow.language.lexer import KEYWORDS
 from avow.ros.bags import Carried, Event, NoBag, Origin, carried, digest_trace, messages
 from avow.ros.calls import is_part, parts_of, with_calls
 from avow.ros.dds import LOOPBACK, ask_domain, domain_of
-from avow.ros.definitions import Definitions
+from avow.ros.definitions import Definitions, definition_file
 from avow.ros.drafting import Given, by_names, draft, is_plumbing, watch
 from avow.ros.listing import EVERY_SIDE, Listed, Listing, NoListing, parse_listing
 from avow.ros.master import ask_master
 from avow.ros.names import is_name
-from avow.ros.sources import definitions
+from avow.ros.sources import DISTRIBUTIONS, definitions, require
 
 _MASTER = re.compile(r"https?://[^/\s]+/?\Z|ros1\Z")
 _DOMAIN = re.compile(r"((?:dds|ros2)(?::\d+)?)(?:@([\w.:-]+))?\Z")
 
 
-def draft_system(bag: Path | None, graph: str | None, distro: str | None, folder: Path) -> tuple[str, ...]:
-    """Write the system's folder; returns how bag and graph disagree. Raises Rejected if something cannot be read;
-    nothing is written then."""
+def draft_system(
+    bag: Path | None, graph: str | None, distro: str | None, own: tuple[Path, ...], folder: Path
+) -> tuple[str, ...]:
+    """Write the system's folder; returns how bag and graph disagree, and which topics got no ports. `own`: files or
+    folders of message definitions. Raises Rejected if something cannot be read; nothing is written then."""
     differences: tuple[str, ...] = ()
-    known, wrong = definitions((), distro)
-    if wrong:
-        raise Rejected(*wrong)
-    base = known
+    base = require(definitions((), distro))
+    known = require(definitions(own, distro))
+    origin = Origin(distro, own)
     listing = _listing(graph) if graph is not None else None
     qos = listing.qos if listing is not None else ""
     origins: list[str] = []
     given = Given(folder.name, "", listing or Listing(()), known, frozenset(KEYWORDS), distro=distro)
     if bag is not None:
         try:
-            found = carried(bag, Origin(distro))
+            found = carried(bag, origin)
             known = Definitions({**known.messages, **found.known})
             seen, note = watch(known, found.types)
             whole = {topic for topic, kind in found.types.items() if not parts_of(topic, kind)}
             heard: set[str] = set()
-            for event, _ in islice(messages(bag, Origin(distro), whole.__contains__), DRAFT_MESSAGES):
+            for event, _ in islice(messages(bag, origin, whole.__contains__), DRAFT_MESSAGES):
                 note(event)
                 heard |= _names_in(event)
         except NoBag as no:
@@ -71,21 +72,23 @@ def draft_system(bag: Path | None, graph: str | None, distro: str | None, folder
     assert listing is not None
     if graph is not None:
         origins.append("the running graph" if _MASTER.match(graph) or _DOMAIN.match(graph) else Path(graph).name)
-        given = replace(given, ros2=given.ros2 or _DOMAIN.match(graph) is not None)
+        newer = distro is not None and DISTRIBUTIONS[distro].startswith("ros2")
+        given = replace(given, ros2=given.ros2 or newer or _DOMAIN.match(graph) is not None)
     listing = with_calls(_sound(listing))
     if not any(node.publishes or node.subscribes for node in listing.nodes):
         hint = "give the output of `ros2 node info NODE` (or `rosnode info`) of each node, with its indented sections"
         raise Rejected(Diagnostic("CLI011", f"{' and '.join(origins)}: no node has a topic", hint=hint))
-    if bag is not None:
-        given = replace(given, messages=_own_types(listing, known, base))
+    given = replace(given, messages=_own_types(listing, known, base))
     graph_file = "models/rosgraph.txt" if graph is not None else None
     given = replace(given, listing=replace(listing, qos=qos), origin=" and ".join(origins), graph=graph_file)
     made = draft(given)
+    if made.unknown:
+        text = f"not known: {', '.join(made.unknown)}; the topics of these types have no ports: draft again with"
+        differences += (f"{text} `--messages FOLDER`, the folder of your own, and with `--distro` for those of ROS",)
     write(folder / "system.rcl", format_text(made.contract, str(folder / "system.rcl")))
     write(folder / "plan.yaml", made.plan)
-    for name, text in given.messages.items():
-        package, _, kind = name.partition("/")
-        write(folder / "msg" / package / "msg" / f"{kind}.msg", text)
+    for path, text in given.messages.items():
+        write(folder / "msg" / path, text)
     if graph is not None:
         write(folder / "models/rosgraph.txt", listing.text())
     if qos:
@@ -99,14 +102,15 @@ def draft_system(bag: Path | None, graph: str | None, distro: str | None, folder
 def _differences(listing: Listing, found: Carried) -> Iterator[str]:
     """The topics that only the bag has, and those with another type in the graph."""
     known = {topic for node in listing.nodes for side in EVERY_SIDE for topic in getattr(node, side)}
-    for topic, kind in sorted(found.types.items()):
-        if is_plumbing(topic) or is_part(topic):
-            continue
+    own = {topic: kind for topic, kind in sorted(found.types.items()) if not is_plumbing(topic) and not is_part(topic)}
+    for topic, kind in own.items():
         if topic not in known:
-            near = did_you_mean(topic, known - found.types.keys())
-            yield f"{topic} is in the bag, and no node of the graph has it{f': {near}' if near else ''}"
+            near = (f": did you mean `{other}`?" for other in nearest(topic, known - found.types.keys(), alike=0.75))
+            yield f"{topic} is in the bag, and no node of the graph has it{''.join(near)}"
         elif listing.types.get(topic, kind) != kind:
             yield f"{topic} has the type {kind} in the bag, and {listing.types[topic]} in the graph"
+    if not known & own.keys():
+        yield "the graph has none of the bag's topics: is it of the same robot?"
 
 
 _OPTION = (
@@ -162,11 +166,13 @@ def _together(listing: Listing | None, found: Carried, heard: set[str]) -> tuple
 
 
 def _own_types(listing: Listing, known: Definitions, base: Definitions) -> dict[str, str]:
-    """The definitions of the topics' types that only the bag has: they are needed where the bag is missing."""
-    kinds = (known.get(kind) for topic, kind in listing.types.items() if not is_plumbing(topic) and not is_part(topic))
+    """The files that define those of the topics' types that no distribution has: they are needed where the bag is
+    missing."""
+    kinds = (known.get(kind) for topic, kind in listing.types.items() if not is_plumbing(topic))
     wanted = {name for kind in kinds if kind is not None for name in (kind.name, *known.within(kind))}
-    found = ((name, known.get(name)) for name in sorted(wanted - base.messages.keys()))
-    return {name: message.text() for name, message in found if message is not None}
+    files = dict(map(definition_file, sorted(wanted - base.messages.keys())))
+    found = {path: [known.get(part) for part in parts] for path, parts in files.items()}
+    return {path: "---\n".join(part.text() for part in parts if part) for path, parts in found.items() if all(parts)}
 
 
 def _asks(topic: str) -> bool:

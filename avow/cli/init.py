@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from importlib import resources
 from pathlib import Path
+from shlex import quote
 
 import click
 
@@ -34,9 +35,16 @@ _PARTS = ("gitignore.txt", "dodo.txt", "monitor.txt")
     "or JSON.",
 )
 @click.option("--distro", help="The ROS distribution whose message types hold: noetic, humble, jazzy, …")
+@click.option("--messages", type=PathArgument(exists=True), multiple=True, help="The folder of your own .msg files.")
 @json_option()
 def command(
-    directory: Path, template: str | None, bag: Path | None, graph: str | None, distro: str | None, as_json: bool
+    directory: Path,
+    template: str | None,
+    bag: Path | None,
+    graph: str | None,
+    distro: str | None,
+    messages: tuple[Path, ...],
+    as_json: bool,
 ) -> int:
     """Make DIRECTORY a workspace with one system that verifies. Nothing that exists is overwritten.
 
@@ -52,25 +60,27 @@ def command(
     drafted = bag is not None or graph is not None
     if drafted and template is not None:
         raise click.UsageError("a draft has no template: leave --template out")
-    if distro is not None and not drafted:
-        raise click.UsageError("--distro goes with --from-bag or --from-graph")
+    if not drafted and (distro is not None or messages):
+        raise click.UsageError("--distro and --messages go with --from-bag or --from-graph")
     if distro is not None and distro not in DISTRIBUTIONS:
         hint = suggest(distro, DISTRIBUTIONS) or f"known: {', '.join(DISTRIBUTIONS)}"
         raise click.UsageError(f"--distro: there is no distribution '{distro}'; {hint}")
     if drafted:
-        return _drafted(directory, bag, graph, distro, as_json)
+        return _drafted(directory, bag, graph, distro, messages, as_json)
     _from_template(directory, template or "plain")
     _workspace(directory)
     return _told(directory, "thermostat", "doit verify", as_json)
 
 
-def _drafted(directory: Path, bag: Path | None, graph: str | None, distro: str | None, as_json: bool) -> int:
+def _drafted(
+    directory: Path, bag: Path | None, graph: str | None, distro: str | None, own: tuple[Path, ...], as_json: bool
+) -> int:
     from avow.cli.from_ros import draft_system
 
     outer = find_workspace(directory.resolve().parent)
     within = outer is not None and directory.resolve().parent == outer.contracts.resolve()
     name = re.sub(r"[^A-Za-z0-9_-]", "_", directory.resolve().name).lstrip("_-0123456789") or "robot"
-    for text in draft_system(bag, graph, distro, directory if within else directory / "contracts" / name):
+    for text in draft_system(bag, graph, distro, own, directory if within else directory / "contracts" / name):
         click.echo(f"warning: {text}", err=True)
     if not within:
         _workspace(directory)
@@ -102,7 +112,7 @@ def _told(directory: Path, system: str, next_: str, as_json: bool) -> int:
     if as_json:
         click.echo(document({"workspace": str(directory), "systems": [system], "next": next_}))
         return 0
-    go = "" if directory.resolve() == Path.cwd() else f"  cd {directory}\n"
+    go = "" if directory.resolve() == Path.cwd() else f"  cd {quote(str(directory))}\n"
     where = system if directory.name == system else f"contracts/{system}"
     click.echo(f"{directory}: a workspace with one system, {where}\n\nnext:\n{go}  {next_}")
     return 0

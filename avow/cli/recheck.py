@@ -145,6 +145,6 @@ def command(path: Path, certificates: Path, as_json: bool) -> int:
     else:
         if proofs:  # a loop's key is of several claims
             names_of = listed([short(name) for name in proofs.values()])
-            click.echo(f"proofs of the report without a line (several claims together are a loop's): {names_of}")
+            click.echo(f"proofs of the report without a line (they are of several claims together): {names_of}")
         click.echo(", ".join(f"{name} {version}" for name, version in versions().items()))
     return 0 if all(claim.established for claim in told) else 1

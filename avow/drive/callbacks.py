@@ -228,7 +228,9 @@ class Driven(Refusals, Messages, Turns):
         kind = self.services[service] + REQUEST
 
         def answer(request: Any, call: str) -> None:
-            self.say(told, self.call(act, request), call)
+            if (response := self.call(act, request)) is None:
+                raise TypeError(f"the callback of {whole} returned None: return the response")
+            self.say(told, response, call)
 
         turn = self.turn(group, answer)
         self.heard[asked] = ((kind, lambda request: turn(request, str(self.number or len(self.taken)))),)
@@ -271,6 +273,7 @@ class Driven(Refusals, Messages, Turns):
     def install(self) -> None:
         """Install the modules of messages and services, and refuse every other module of ROS, clocks and chance."""
         self.clocks_and_chance()
+        self.no_threads()
         self.classes |= {name: self.message_class(name) for name in self.types}
         packages: dict[str, dict[str, dict[str, Any]]] = {}
         for name, made in self.classes.items():
@@ -336,8 +339,6 @@ def answers(driven: Driven, make: Callable[[Any, Any], Any]) -> Callable[[Any, A
                 wrong += called_from(traceback.extract_tb(error.__traceback__))
             said = list(driven.said)  # without what a callback says when it is cut
             driven.cut()
-            if threading.active_count() > 1 and not wrong:
-                driven.refuse("a thread of its own")
             return json.dumps(
                 {
                     "heard": {topic: kinds[0][0] for topic, kinds in driven.heard.items() if kinds},

@@ -3,17 +3,24 @@ names it and its line, even if the class catches it."""
 
 from __future__ import annotations
 
+import _thread
 import datetime
+import difflib
+import functools
 import importlib.abc
 import importlib.machinery
 import os
 import random
+import re
 import sys
+import threading
 import time
 import traceback
 import types
 from collections.abc import Sequence
 from typing import Any, ClassVar
+
+from .turns import Turn
 
 FOREIGN: tuple[str, ...] = ("rospy", "rclpy", "roslib", "rosgraph", "rospkg", "rosbag", "actionlib", "genpy")
 FOREIGN += ("tf", "tf2_ros", "tf2_py", "tf_transformations", "message_filters", "dynamic_reconfigure", "ros_numpy")
@@ -31,6 +38,7 @@ INSTEAD = {
     "Client.call": "call_async and add_done_callback",
     "coroutine that waits": "call_async and add_done_callback",
     "Rate": "Timer",
+    "a thread of its own": "a timer",
     ".sleep": "a timer",
     "ament_index_python": "a path beside the file: pathlib.Path(__file__)",
 }
@@ -70,7 +78,7 @@ class Refusals:
 
     def refuse(self, what: str, instead: str = "") -> NotDriven:
         """The error is recorded with its line, so that it is reported even if the class catches it."""
-        instead = instead or next((text for end, text in INSTEAD.items() if what.endswith(end)), "")
+        instead = next((text for end, text in INSTEAD.items() if what.endswith(end)), instead)
         if what.startswith(("time.", "datetime.")) and not instead:
             instead = "rospy.Time.now()" if self.kind == "rospy" else "get_clock().now()"
         instead = f"; instead: {instead}" if instead else ""
@@ -87,7 +95,7 @@ class Refusals:
                 if not sys._getframe(1).f_code.co_filename.startswith((library, "<")):
                     if name == "time.sleep":
                         return self.pause(int(given[0] * 10**9))
-                    raise self.refuse(name)
+                    raise self.refuse(name, "random.Random(0)" if name.startswith("random.") else "")
                 return real(*given, **named)
 
             return read
@@ -109,6 +117,17 @@ class Refusals:
 
         names.update({name: refusing(f"random.{name}", real) for name, real in drawing.items()}, seed=seed)
 
+    def no_threads(self) -> None:
+        """A thread of the class would change it beside its callbacks, unseen if it ends soon."""
+        for module in (_thread, threading):
+            for name in [name for name in vars(module) if re.match("_?start_", name)]:
+                setattr(module, name, functools.partial(self._begin, getattr(module, name)))
+
+    def _begin(self, begin: Any, act: Any, *given: Any, **named: Any) -> Any:
+        if not isinstance(getattr(act, "__self__", None), Turn):
+            raise self.refuse("a thread of its own")
+        return begin(act, *given, **named)
+
     def module(self, name: str, content: dict[str, Any]) -> types.ModuleType:
         made = types.ModuleType(name)
         vars(made).update({"__path__": [], **content})  # so that its submodules are searched for, and refused
@@ -116,7 +135,7 @@ class Refusals:
         def absent(attribute: str) -> Any:
             if attribute.startswith("__"):
                 raise AttributeError(attribute)
-            raise self.refuse(f"{name}.{attribute}")
+            raise self.refuse(f"{name}.{attribute}", *difflib.get_close_matches(attribute, content, 1, 0.65))
 
         vars(made)["__getattr__"] = absent
         sys.modules[name] = made

@@ -272,12 +272,10 @@ def _endpoints(driven: Any) -> tuple[Any, ...]:
             def act(request: Any) -> Any:
                 """What a handler may return: a response, or the values of its fields."""
                 returned = handler(request)
-                if type(returned) is response:
+                if returned is None or type(returned) is response:
                     return returned
                 if isinstance(returned, dict):
                     return response(**returned)
-                if returned is None:
-                    raise TypeError("the handler of a service returned None")
                 return response(*(returned if isinstance(returned, list | tuple) else (returned,)))
 
             self.resolved_name = driven.serve(name, service_class, act, FREE)

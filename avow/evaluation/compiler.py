@@ -18,18 +18,13 @@ from avow.formulas.values import Data, Element, FunctionValue, Value
 from avow.language import sorts as s
 from avow.language import terms as t
 from avow.language.operators import OPERATORS, implementation
+from avow.language.roots import NotEvaluable
+
+__all__ = ["Code", "Compiler", "Domains", "Env", "NotEvaluable", "combinations", "finite_values", "member_of"]
 
 Env = list[Any]
 Code = Callable[[Env], Any]
 Domains = Mapping[s.Sort, Sequence[Value]]
-
-
-class NotEvaluable(Exception):  # noqa: N818 - it names a state, not a fault
-    """Exact evaluation is impossible here; `reason` is a clause for people: ``division by zero``."""
-
-    def __init__(self, reason: str) -> None:
-        super().__init__(reason)
-        self.reason = reason
 
 
 def finite_values(sort: s.Sort, domains: Domains | None = None) -> tuple[Value, ...] | None:
@@ -226,15 +221,6 @@ class Compiler:
     def _arithmetic(self, term: t.Arithmetic) -> Code:
         left, right = self.code(term.left), self.code(term.right)
         act = implementation(OPERATORS[term.operator].evaluate)
-        if term.operator == "/":
-
-            def divide(env: Env) -> Any:
-                divisor = right(env)
-                if divisor == 0:
-                    raise NotEvaluable("division by zero")
-                return act(left(env), divisor)
-
-            return divide
         return lambda env: act(left(env), right(env))
 
     def _compare(self, term: t.Compare) -> Code:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from fractions import Fraction
 from typing import Any
 
 from avow.evaluation.compiler import Compiler, Env, NotEvaluable, member_of
 from avow.formulas import values
 from avow.formulas.renaming import bound_names
 from avow.formulas.values import Data
+from avow.language.roots import Surd, quotient
 from avow.language.sorts import IntegerSort, NaturalSort
 from avow.language.terms import Arithmetic, Construct, Negative, SequenceTerm, Term, TupleTerm, Variable, Widen
 
@@ -49,7 +49,7 @@ def pattern(compiler: Compiler, term: Term, unbound: set[str]) -> Match | None:
             if narrow is None:
                 return None
             whole = narrow
-            return lambda env, value: value.denominator == 1 and whole(env, int(value))
+            return lambda env, value: not isinstance(value, Surd) and value.denominator == 1 and whole(env, int(value))
         case Negative(term=inside):
             positive = pattern(compiler, inside, unbound)
             if positive is None:
@@ -144,6 +144,6 @@ def _arithmetic(compiler: Compiler, term: Arithmetic, unbound: set[str]) -> Matc
                     return False
                 if whole:
                     return value % fixed == 0 and match_inner(env, value // fixed)
-                return match_inner(env, Fraction(value) / fixed)
+                return match_inner(env, quotient(value, fixed))
 
     return match

@@ -8,7 +8,7 @@ replaced legitimately, and its record is history. The audit does not check wheth
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from datetime import datetime, timedelta
 from enum import StrEnum
 from pathlib import Path
@@ -195,41 +195,41 @@ def _impossible(
 def _files(
     entries: tuple[Entry, ...], root: Path, keys: Mapping[tuple[str, str], str] | None, strict: bool
 ) -> Iterable[Discrepancy]:
-    left: dict[str, list[Entry]] = {}
+    left: dict[str, Entry] = {}
     read: dict[str, tuple[str, Entry]] = {}
-    newest: dict[tuple[str, str], str] = {}
-    alike: dict[tuple[object, ...], list[Entry]] = {}
     for entry in entries:  # oldest first: the newest record wins
-        record = entry.evidence
-        newest[record.obligation, record.method] = record.key
-        alike.setdefault(_words(record), []).append(entry)
-        for path in record.outputs:
-            left.setdefault(path, []).append(entry)
-        for path, mark in record.inputs.items():
-            read[path] = (mark, entry)
+        left |= dict.fromkeys(entry.evidence.outputs, entry)
+        read |= {path: (mark, entry) for path, mark in entry.evidence.inputs.items()}
     # A record that counts today read today's files, even if a later attempt read them in another state in between.
     for entry in entries:
         if keys and keys.get((entry.evidence.obligation, entry.evidence.method)) == entry.evidence.key:
             read |= {path: (mark, entry) for path, mark in entry.evidence.inputs.items()}
-    relied_upon = [newest] if keys is None else [keys, newest] if strict else [keys]
-
-    def serious(entry: Entry) -> bool:
-        """Only files that a status rests on today are serious: files of past attempts may be deleted, and among records
-        with the same statement and the same deciding details only the newest counts."""
-        record = entry.evidence
-        if all(known.get((record.obligation, record.method)) != record.key for known in relied_upon):
-            return False
-        newer = (e.evidence for e in alike[_words(record)] if e.number > entry.number)
-        return not any(_stands_on(later) == _stands_on(record) for later in newer)
-
-    for path, owners in left.items():
-        entry = owners[-1]
-        mark = entry.evidence.outputs[path]
-        undermined = any(e.evidence.outputs[path] == mark and serious(e) for e in owners)
-        yield from _compare(root, path, mark, entry, made=True, serious=undermined)
+    made = [(path, entry.evidence.outputs[path], entry) for path, entry in left.items()]
+    wrong = [(path, mark, told) for path, mark, e in made for told in _compare(root, path, mark, e, made=True)]
+    relied_upon = _relied_upon(entries, keys, strict) if wrong else set()
+    for path, mark, (fault, text) in wrong:
+        yield Discrepancy(fault, path, text, (path, mark) in relied_upon)
     for path, (mark, entry) in read.items():
-        if path not in left:
-            yield from _compare(root, path, mark, entry, made=False, serious=False)
+        for fault, text in _compare(root, path, mark, entry, made=False) if path not in left else ():
+            yield Discrepancy(fault, path, text, serious=False)
+
+
+def _relied_upon(
+    entries: Sequence[Entry], keys: Mapping[tuple[str, str], str] | None, strict: bool
+) -> set[tuple[str, str]]:
+    """The files, with their digests, that a status rests on today: files of past attempts may be deleted, and among
+    records with the same statement and the same deciding details only the newest counts."""
+    newest = {(e.evidence.obligation, e.evidence.method): e.evidence.key for e in entries}
+    asked = [newest] if keys is None else [keys, newest] if strict else [keys]
+    later: dict[tuple[object, ...], list[Mapping[str, object]]] = {}
+    found: set[tuple[str, str]] = set()
+    for record in (entry.evidence for entry in reversed(entries)):
+        alike, stands = later.setdefault(_words(record), []), _stands_on(record)
+        current = any(known.get((record.obligation, record.method)) == record.key for known in asked)
+        if current and stands not in alike:
+            found.update(record.outputs.items())
+        alike.append(stands)
+    return found
 
 
 def _words(record: Evidence) -> tuple[object, ...]:
@@ -244,23 +244,19 @@ def _stands_on(record: Evidence) -> Mapping[str, object]:
     return {name: record.details[name] for name in STANDS_ON if name in record.details}
 
 
-def _compare(root: Path, path: str, mark: str, entry: Entry, *, made: bool, serious: bool) -> Iterable[Discrepancy]:
-    behind = f"{path} (record {entry.number + 1}: {entry.evidence.obligation}, {entry.evidence.method})"
+def _compare(root: Path, path: str, mark: str, entry: Entry, *, made: bool) -> Iterable[tuple[Fault, str]]:
     place = os.path.join(root, path)  # noqa: PTH118 - of each file of each record in every run
+    behind = f"{path} (record {entry.number + 1}: {entry.evidence.obligation}, {entry.evidence.method})"
     if made and (os.path.islink(place) or ".." in path.split("/")):  # noqa: PTH114
-        text = f"{behind} is a symbolic link, or a path, that leads elsewhere"
-        yield Discrepancy(Fault.REDIRECTED, path, text, serious)
+        yield Fault.REDIRECTED, f"{behind} is a symbolic link, or a path, that leads elsewhere"
     try:
         now = digest_once(Path(place))
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
-        yield Discrepancy(Fault.GONE if made else Fault.OUTDATED, path, f"{behind} cannot be read: {reason}", serious)
+        yield Fault.GONE if made else Fault.OUTDATED, f"{behind} cannot be read: {reason}"
         return
-    if now == mark:
-        return
-    if made:
+    if now != mark and made:
         text = f"{behind} was changed after the record was written: SHA-256 {now[:12]}…, recorded {mark[:12]}…"
-        yield Discrepancy(Fault.CHANGED, path, text, serious)
-    else:
-        text = f"{behind} has changed since: the evidence is stale"
-        yield Discrepancy(Fault.OUTDATED, path, text, serious)
+        yield Fault.CHANGED, text
+    elif now != mark:
+        yield Fault.OUTDATED, f"{behind} has changed since: the evidence is stale"

@@ -11,27 +11,29 @@ full.
   folder names the ledgers themselves (`avow.evidence.heads`).
 - A line has one spelling, byte for byte. Another encoding, an extra space or a repeated key is damage.
 - The same evidence appended twice is kept once.
-- ``<file>.read`` is a note of this user's Avow (`avow.base.notes`): the first so many bytes, with that digest, were
-  found without damage. A run does not check these lines against each other again; `audit` and a fresh run do.
+- Groups of lines that were found without damage are kept, with their digest and their records, in the user's cache
+  (`avow.base.remembered.Kept`). A run does not read them again; `audit` and a fresh run do.
 """
 
 from __future__ import annotations
 
 import contextlib
 import functools
-import hashlib
 import json
 import os
+import sys
 import threading
 from collections.abc import Iterator, Sequence
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
 from avow.base.codec import Unreadable, canonical, from_json, from_text, plain, to_json
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.files import identity, read_regular, sha256, write
-from avow.base.notes import read_note, write_note
 from avow.base.records import dataclass
+from avow.base.remembered import Kept
+from avow.base.tuning.sizes import LINES_KEPT
 from avow.base.verdict import Verdict
 from avow.evidence.appending import append, drop_half_line, locked, open_file
 from avow.evidence.heads import GENESIS as GENESIS
@@ -68,21 +70,13 @@ class Damage:
     reason: str
 
 
-@dataclass(frozen=True, slots=True)
-class _Known:
-    """The number of a ledger's bytes that were found without damage, with their digest."""
-
-    bytes: int
-    sha256: str
-
-
 class Ledger:
     """One system's ledger file. Safe to use from several threads and several processes at once."""
 
     def __init__(self, path: Path, *, remembers: bool = False) -> None:
-        """`remembers`: lines that a note records as read without damage are not checked again."""
+        """`remembers`: groups of lines that this user's Avow found without damage are not read again."""
         self.path = path
-        self._remembers = remembers
+        self._kept = Kept("ledgers", path) if remembers else None
         self._lock = threading.RLock()
         self._held = 0
         self._forget()
@@ -132,10 +126,10 @@ class Ledger:
             return tuple({e.number: e for e in sorted(found, key=lambda e: e.number)}.values())
 
     def check(self) -> None:
-        """Check every line against the one before it, whatever a note records."""
+        """Check every line against the one before it, whatever is kept."""
         with self._lock:
-            if self._remembers:
-                self._remembers = False
+            if self._kept is not None:
+                self._kept = None
                 self._forget()
 
     @contextlib.contextmanager
@@ -163,19 +157,18 @@ class Ledger:
             drop_half_line(file)
             self._refresh()
             cut = self._lines > 0 and bool(self._cut_off())
-            added, lines, result = dict[bytes, Entry](), [], []
+            added, lines, result = dict[str, Entry](), [], []
             previous, number = self._stated_head, self._lines
             for evidence in evidences:
                 spelled = canonical(encode(evidence))
-                identity = spelled.encode()
-                known = self._known.get(identity) or added.get(identity)
+                known = self._same(evidence, spelled) or added.get(spelled)
                 if known is not None:
                     result.append(known)
                     continue
                 mark, line = _spell(spelled, number, previous)
                 entry = Entry(number, previous, mark, evidence)
                 lines.append(line + "\n")
-                added[identity] = entry
+                added[spelled] = entry
                 result.append(entry)
                 previous, number = mark, number + 1
             if lines and not self._lines:
@@ -183,7 +176,6 @@ class Ledger:
             if lines:
                 append(file, "".join(lines).encode())
                 self._refresh()
-                self._remember()
             if lines and not cut:  # a new head would hide the cut; a ledger deleted as a whole begins again
                 self._write_head(Head(previous, number))
             return tuple(result)
@@ -200,35 +192,19 @@ class Ledger:
 
     def _forget(self) -> None:
         self._seen: tuple[int | str, ...] = ()
-        self._digest = hashlib.sha256()
+        self._group: list[bytes] = []
         self._offset = 0
         self._lines = 0
         self._tail = b""
         self._stated_head = GENESIS
         self._entries: list[Entry] = []
         self._damage: list[Damage] = []
-        self._known: dict[bytes, Entry] = {}
         self._by_key: dict[tuple[str, str], list[Entry]] = {}
         self._refuted: dict[tuple[str, str], list[Entry]] = {}
 
     @property
     def _head_file(self) -> Path:
         return self.path.with_name(self.path.name + ".head")
-
-    @property
-    def _note(self) -> Path:
-        return self.path.with_name(self.path.name + ".read")
-
-    def _remember(self) -> None:
-        if self._remembers and not self._damage:
-            with contextlib.suppress(OSError):  # the next run reads all of it again
-                write_note(self._note, _Known(self._offset, self._digest.hexdigest()))
-
-    def _remembered(self, data: bytes) -> int:
-        """The number of a ledger's bytes that were read before and found without damage."""
-        note = read_note(_Known, self._note) if self._remembers and not self._offset else None
-        known = note is not None and note.bytes <= len(data) and sha256(data[: note.bytes]) == note.sha256
-        return note.bytes if note is not None and known else 0
 
     def _refresh(self) -> None:
         """Read what was added since the last look (by this or another process)."""
@@ -247,21 +223,42 @@ class Ledger:
             self._forget()
             return
         self._seen = identity(info, self.path)
-        known = self._remembered(data)
         whole = data[: data.rfind(b"\n") + 1]
         self._offset += len(whole)
         self._tail = data[len(whole) :]
-        self._digest.update(whole)
-        if known:
-            self._believe(whole[:known].split(b"\n")[:-1])
-        for line in whole[known:].split(b"\n")[:-1]:
+        lines = whole.split(b"\n")[:-1]
+        for line in lines[self._believe(lines) :]:
             self._take(line)
+            self._group.append(line)
+            if len(self._group) == LINES_KEPT:
+                self._keep_group()
 
-    def _believe(self, lines: Sequence[bytes]) -> None:
-        """Take the first lines, which were checked before."""
-        for line, data in zip(lines, json.loads(b"[%b]" % b",".join(lines)), strict=True):
-            self._keep(line[len(_BEFORE) : line.rindex(_BEHIND)], _entry(data))
-        self._lines, self._stated_head = len(lines), self._entries[-1].hash
+    def _believe(self, lines: Sequence[bytes]) -> int:
+        """Take the groups at the beginning that are kept; returns the number of their lines."""
+        taken = 0
+        while self._kept is not None and self._lines == taken <= len(lines) - LINES_KEPT:
+            mark = _mark(lines[taken : taken + LINES_KEPT], self._stated_head)
+            found: tuple[Entry, ...] | None = self._kept.get(str(taken), mark)
+            if found is None:
+                break
+            for entry in found:
+                self._keep(entry)
+            taken += LINES_KEPT
+            self._lines, self._stated_head = taken, found[-1].hash
+        return taken
+
+    def _keep_group(self) -> None:
+        if self._kept is not None and not self._damage:
+            known: dict[object, object] = {}
+            entries = tuple(_shared(entry, known) for entry in self._entries[-LINES_KEPT:])
+            self._kept.put(str(self._lines - LINES_KEPT), _mark(self._group, entries[0].previous), entries)
+            self._kept.tidy()
+        self._group = []
+
+    def _same(self, evidence: Evidence, spelled: str) -> Entry | None:
+        """The entry of the same record."""
+        alike = self._by_key.get((evidence.obligation, evidence.key), ())
+        return next((entry for entry in alike if canonical(encode(entry.evidence)) == spelled), None)
 
     def _take(self, line: bytes) -> None:
         number = self._lines
@@ -278,20 +275,18 @@ class Ledger:
         if not follows:  # reported, but the record itself may still be whole: dropping it could hide a refutation
             reason = "does not follow the record before it: a record was removed, inserted, moved or made unreadable"
             self._damage.append(Damage(number + 1, reason))
-        identity = evidence.encode()
         mark, spelled = _spell(evidence, entry.number, entry.previous)
         if mark != entry.hash:
             self._damage.append(Damage(number + 1, f"was changed after it was written ({entry.evidence.obligation})"))
             return
         if spelled.encode() != line:  # the content is as it was written, but another program wrote it
             self._damage.append(Damage(number + 1, "is not spelled as it was written (encoding, spaces, doubled keys)"))
-        if follows and identity in self._known:
-            self._damage.append(Damage(number + 1, f"repeats record {self._known[identity].number + 1}"))
-        self._keep(identity, entry)
+        if follows and (same := self._same(entry.evidence, evidence)):
+            self._damage.append(Damage(number + 1, f"repeats record {same.number + 1}"))
+        self._keep(entry)
 
-    def _keep(self, identity: bytes, entry: Entry) -> None:
+    def _keep(self, entry: Entry) -> None:
         self._entries.append(entry)
-        self._known.setdefault(identity, entry)
         record = entry.evidence
         self._by_key.setdefault((record.obligation, record.key), []).append(entry)
         if record.verdict is Verdict.REFUTED and CASE in record.details:
@@ -342,15 +337,37 @@ def encode(evidence: Evidence) -> dict[str, Any]:
     return {**to_json(evidence), "seconds": plain(float(evidence.seconds))}  # one spelling, whatever the number's type
 
 
-_BEFORE, _BEHIND = b'{"evidence":', b',"hash":"'
-"""The text of a line before its record, and the last text after it."""
-
-
 def _spell(evidence: str, number: int, previous: str) -> tuple[str, str]:
     """A line's hash and the line itself; `evidence` is the record's canonical text."""
     tail = f'"n":{number},"prev":{canonical(previous)}}}'
     mark = sha256(f'{{"evidence":{evidence},{tail}')
     return mark, f'{{"evidence":{evidence},"hash":"{mark}",{tail}'
+
+
+def _mark(lines: Sequence[bytes], previous: str) -> str:
+    """Digest of a group of lines, of the hash before them, and of the code that reads them."""
+    return sha256(b"\n".join((_code(), previous.encode(), *lines)))
+
+
+@functools.cache
+def _code() -> bytes:
+    modules = (sys.modules[kind.__module__] for kind in (Entry, Evidence, Verdict, Unreadable))
+    return b"\n".join((sys.version.encode(), *(read_regular(Path(str(module.__file__))) for module in modules)))
+
+
+def _shared(value: Any, known: dict[object, Any]) -> Any:
+    """The value, with equal texts, and tuples and mappings of texts, as one object: most records of a node say the same
+    in most fields. Numbers are left as they are, since 1 equals true."""
+    if isinstance(value, Entry | Evidence):
+        return replace(value, **{field.name: _shared(getattr(value, field.name), known) for field in fields(value)})
+    if type(value) is dict:
+        value = {key: _shared(item, known) for key, item in value.items()}
+        parts = tuple(value.items())
+        return known.setdefault(("of", parts), value) if all(type(item) is str for item in value.values()) else value
+    if type(value) is tuple:
+        value = tuple(_shared(item, known) for item in value)
+        return known.setdefault(value, value) if all(type(item) is str for item in value) else value
+    return known.setdefault(value, value) if type(value) is str else value
 
 
 def _entry(data: object) -> Entry:

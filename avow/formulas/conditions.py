@@ -1,9 +1,10 @@
 """The conditions under which a formula demands something, derived from its meaning and not from its connectives.
 
 ``a -> b``, ``not a or b``, ``not (a and not b)`` and ``b or not a`` demand b under a; ``a <=> b`` and its equivalents
-demand b under a, and ``not b`` under ``not a``. The formula is split into disjunctions, each under the universal
-quantifiers around it. The condition of a disjunction is the negation of its items about inputs only, and of the denials
-among the other items if an item is left that is not a denial: the demand.
+demand b under a, and ``not b`` under ``not a``: if both are about outputs, b under a and a under b. The formula is
+split into disjunctions, each under the universal quantifiers around it. The condition of a disjunction is the negation
+of its items about inputs only, and of the denials among the other items if an item is left that is not a denial: the
+demand.
 """
 
 from __future__ import annotations
@@ -53,11 +54,10 @@ def conditions(formula: t.Term) -> tuple[Condition, ...]:
 
 @dataclass(frozen=True, slots=True)
 class _Clause:
-    """One disjunction. `halved`: it is one direction of an equivalence."""
+    """One disjunction."""
 
     outer: tuple[t.Variable, ...]
     items: tuple[t.Term, ...]
-    halved: bool = False
 
 
 def _parts(clause: _Clause) -> tuple[t.Term, ...]:
@@ -65,8 +65,6 @@ def _parts(clause: _Clause) -> tuple[t.Term, ...]:
     rest = [item for item in clause.items if item not in given]
     if not given or not rest:
         given, rest = [], list(clause.items)
-        if clause.halved:
-            return ()
     denials = [item for item in rest if _is_denial(item)]
     if len(denials) < len(rest):
         given += denials
@@ -119,15 +117,14 @@ def _clauses(term: t.Term, positive: bool, halve: bool = True) -> Iterator[_Clau
             t.Quantifier.FORALL if positive else t.Quantifier.EXISTS
         ):
             for clause in _clauses(body, positive, halve):
-                yield _Clause((*variables, *clause.outer), clause.items, clause.halved)
+                yield _Clause((*variables, *clause.outer), clause.items)
         case _:  # demanded as a whole
             yield _Clause((), (term if positive else negation(term),))
 
 
 def _halves(left: t.Term, right: t.Term, same: bool) -> Iterator[_Clause]:
     for one in (False, True):
-        for clause in _joined([(left, one), (right, same is not one)], False):
-            yield _Clause(clause.outer, clause.items, True)
+        yield from _joined([(left, one), (right, same is not one)], False)
 
 
 def _joined(parts: list[tuple[t.Term, bool]], halve: bool) -> Iterator[_Clause]:
@@ -149,9 +146,7 @@ def _joined(parts: list[tuple[t.Term, bool]], halve: bool) -> Iterator[_Clause]:
     for chosen in product(*choices):
         items = tuple(dict.fromkeys(item for clause in chosen for item in clause.items))
         if not any(negation(item) in items for item in items):  # otherwise it is a tautology
-            yield _Clause(
-                tuple(v for clause in chosen for v in clause.outer), items, any(clause.halved for clause in chosen)
-            )
+            yield _Clause(tuple(v for clause in chosen for v in clause.outer), items)
 
 
 def _is_junction(term: t.Term, positive: bool) -> bool:

@@ -37,14 +37,14 @@ def rows_of(node: Node, port: Port, sorts: Sequence[Sort], scenario: Scenario) -
         return None
     try:
         table = scenario.table(interpretation[0])
-        cells = [[_value(t, s) for t in table.column(c)] for c, s in zip(interpretation[1], sorts, strict=True)]
+        cells = [[cell_value(t, s) for t in table.column(c)] for c, s in zip(interpretation[1], sorts, strict=True)]
     except (KeyError, ValueError):
         return None
     return list(zip(*cells, strict=True))
 
 
-def _value(text: str, sort: Sort) -> Value:
-    """The value that a text denotes. Raises ValueError."""
+def cell_value(text: str, sort: Sort) -> Value:
+    """The value of the sort that a table's cell denotes by itself. Raises ValueError."""
     match sort:
         case RealSort():
             return exact(text)

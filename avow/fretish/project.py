@@ -18,11 +18,12 @@ from avow.base.diagnostics import Diagnostic, Rejected, Severity, Span
 from avow.language.format import format_text
 from avow.language.lexer import KEYWORDS, quote
 from avow.language.load import check_text
-from avow.language.terms import Builtin, Past
+from avow.language.terms import CALLED, Builtin, Past
 
 from .meaning import Unsaid, demands, remarks
 from .sentence import (
     FIRST,
+    FORM,
     Expression,
     Scope,
     Sentence,
@@ -175,7 +176,7 @@ def nodes(project: Project, outputs: frozenset[str] = frozenset()) -> Nodes:
             sentence = parse(requirement.text)
         except Unreadable as error:
             place = replace(requirement.span, column=requirement.span.column + error.column - 1)
-            faults.append(Diagnostic("FRET002", f"{requirement.name}: {error.message}", place))
+            faults.append(Diagnostic("FRET002", f"{requirement.name}: {error.message}", place, hint=FORM))
             continue
         word = _word(sentence.component)
         of, component, found = components.setdefault(word, (requirement.project, sentence.component, []))
@@ -421,7 +422,7 @@ def _word(name: str) -> str:
     return f"{word}_" if word in KEYWORDS or word in _OPERATORS else word
 
 
-_OPERATORS = {*Past, *Builtin, "length", "implies", "true", "false", "topics"}
+_OPERATORS = {*Past, *Builtin, *CALLED, "implies", "true", "false", "topics"}
 """Words that have a meaning in RCL in some places."""
 
 

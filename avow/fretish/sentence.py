@@ -25,6 +25,9 @@ class Expression:
     text: str = ""
 
 
+FORM = "a sentence is  [in MODE] [when CONDITION] the COMPONENT shall [within 3 seconds] satisfy RESPONSE"
+
+
 class Scope(StrEnum):
     """When a requirement is in force."""
 

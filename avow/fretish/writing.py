@@ -142,7 +142,7 @@ def _say(term: t.Term) -> str:
         ):
             name = "persisted" if operator is t.Past.HELD else "occurred"
             return f"{name}({_say(limit.amount)}, {_say(inner)})"
-        case t.History(operator=operator):
+        case t.History(operator=operator) | t.Operation(operator=operator):
             raise _Beyond(f"`{operator}`")
         case _:
             raise _Beyond(f"a {type(term).__name__.lower()} ({show_sort(term.sort)})" if term.children else "this term")

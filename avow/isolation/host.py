@@ -158,7 +158,7 @@ def _near(name: str, known: set[str]) -> str:
     """The known name that was probably meant, as the end of a message."""
     import difflib
 
-    near = difflib.get_close_matches(name, sorted(known), 1)
+    near = difflib.get_close_matches(name, sorted(known), 1, 0.75)
     return f": did you mean {near[0]}?" if near else ""
 
 

@@ -34,6 +34,17 @@ def way(path: str) -> str:
     return path if "/../" in f"{path}/" and os.path.realpath(usual) != os.path.realpath(path) else usual
 
 
+def _line() -> str:
+    """The line of the program that runs now: not ours, not Python's."""
+    frame = sys._getframe(1)
+    while frame.f_back and frame.f_code.co_filename.startswith(_KNOWN):
+        frame = frame.f_back
+    return f" ({os.path.basename(frame.f_code.co_filename)}, line {frame.f_lineno})" if frame.f_back else ""  # noqa: PTH119
+
+
+_KNOWN = (os.path.dirname(os.path.dirname(os.path.abspath(__file__))) + os.sep, os.path.dirname(os.__file__), "<")  # noqa: PTH100, PTH120
+
+
 def watch(scratch: str) -> Callable[[], list[tuple[str, str]]]:
     """Record accesses from now on. The returned function gives the (event, path) pairs since its last call: ``read`` or
     ``list`` with an absolute path, or ``outside`` with words for an input that cannot be recorded. Files in the folder
@@ -42,6 +53,7 @@ def watch(scratch: str) -> Callable[[], list[tuple[str, str]]]:
     known: set[tuple[str, str]] = set()
 
     def note(event: str, path: str) -> None:
+        path += _line() if event == "outside" else ""
         if (event, path) not in known:
             known.add((event, path))
             new.append((event, path))

@@ -1,8 +1,8 @@
 """A formula as SMT-LIB 2.6 text: the one translation that a certified claim depends on. Nothing is simplified.
 
 NATURAL is Int, with membership asserted wherever a natural can occur: for free and bound variables, functions' results,
-parts of data; an element beyond a sequence's end is some value of its type. Division by zero is some value. Free
-functions are uninterpreted functions; functions under a quantifier are arrays, one argument after the other.
+parts of data; an element beyond a sequence's end is some value of its type. A quotient by zero and the square root of
+a negative number are some value. Free functions are uninterpreted functions; functions under a quantifier are arrays.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from functools import reduce
 
 from avow.language import sorts as s
 from avow.language import terms as t
+from avow.language.subterms import subterms
 
 # forms that are one SMT-LIB function of their parts; comparisons and arithmetic are written as in RCL
 FORMS: dict[type, str] = {t.Not: "not", t.And: "and", t.Or: "or", t.Implies: "=>", t.Iff: "=", t.Conditional: "ite"}
@@ -26,7 +27,7 @@ BUILTINS: dict[t.Builtin, Callable[..., str]] = {
     t.Builtin.MIN: lambda *all_: reduce(lambda a, b: f"(ite (< {b} {a}) {b} {a})", all_),
     t.Builtin.MAX: lambda *all_: reduce(lambda a, b: f"(ite (> {b} {a}) {b} {a})", all_),
 }
-assert BUILTINS.keys() == set(t.Builtin), f"no text in {__file__} for {set(t.Builtin) ^ BUILTINS.keys()}"
+assert (OTHERS := set(t.Builtin) - BUILTINS.keys()) == {t.Builtin.SQRT}, f"no text in {__file__} for {OTHERS}"
 
 # the name of a free variable, with its sort (an INTEGER input may read a NATURAL output); the name of a bound one
 Symbols = Callable[[t.Variable], tuple[str, s.Sort]]
@@ -165,6 +166,13 @@ class Text:
                 return ("{}" if operator == "==" else "(not {})").format(self.same(left, right, bound))
             case t.Compare(operator=head) | t.Arithmetic(operator=head):
                 return form(head, term.children)
+            case t.Operation(operator=t.Builtin.SQRT, arguments=(square,)):
+                if any(part in bound for part in subterms(square)):
+                    raise Untranslatable("a square root of what is quantified")
+                name = symbol(f"sqrt {(said := self.say(square, bound))}")
+                is_root = f"(and (>= {name} 0) (= (* {name} {name}) {said}))"
+                self.declarations[name] = f"(declare-fun {name} () Real)\n(assert (=> (>= {said} 0) {is_root}))"
+                return name
             case t.Operation(operator=builtin, arguments=arguments):
                 return BUILTINS[builtin](*(self.say(a, bound) for a in arguments))
             case t.In(item=item, collection=t.SetTerm(items=items) | t.SequenceTerm(items=items)):

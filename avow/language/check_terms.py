@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import reduce
 
 from avow.base.diagnostics import Span
 from avow.base.optional import complete
@@ -15,7 +16,7 @@ from avow.language.conversions import NUMERIC, WHOLE, alike, common, convert, jo
 from avow.language.foreign import APART
 from avow.language.lexer import Token
 from avow.language.operators import OPERATORS, Mistyped, operation
-from avow.language.printer import show_sort
+from avow.language.printer import show_sort, show_term
 
 _BUILTINS = frozenset(t.Builtin)
 """Names that are operators directly before a parenthesis, unless the contract declares them."""
@@ -38,6 +39,8 @@ class Terms(Names):
                     return self.length(tree, arguments)
                 if name == "indices":
                     return self.indices(tree, arguments)
+                if name in ("norm", "dot"):
+                    return self.product_of_vectors(tree, name, arguments)
                 if name in _BUILTINS:
                     return self.builtin_operation(tree, t.Builtin(name), arguments)
                 if name in _PAST:
@@ -139,6 +142,34 @@ class Terms(Names):
         notes = () if found.at is None else self.declared(terms[found.at])
         self.error(found.code, found.message.format(shown), at, hint=found.hint, notes=notes)
         return None
+
+    def product_of_vectors(
+        self, tree: syntax.Syntax, name: str, arguments: Sequence[syntax.TermSyntax]
+    ) -> t.Term | None:
+        """``dot(v, w)``, of tuples or records of two or three numbers, is ``v.x * w.x + v.y * w.y``. ``norm(v)``, or
+        ``norm(x, y)``, is the root of such a product with itself."""
+        terms: list[t.Term] | None = complete(map(self.term, arguments))
+        if terms is None:
+            return None
+        vectors = [_items(term) for term in terms]
+        if name == "norm":
+            vectors = [terms if len(terms) > 1 else vectors[0]] * 2 if terms else []
+        takes = "a vector, or two or three numbers" if name == "norm" else "two vectors of one length"
+        if len(vectors) != 2 or not 2 <= len(vectors[0]) == len(vectors[1]) <= 3:
+            hint = "a vector is a tuple or a record of two or three numbers"
+            self.error("RCL305", f"`{name}` takes {takes}", tree, hint=hint)
+            return None
+        for part in (*vectors[0], *vectors[1]):
+            if not isinstance(part.sort, NUMERIC):
+                message = f"`{name}` takes {takes}, and `{show_term(part, 'rcl')}` is of type {show_sort(part.sort)}"
+                self.error("RCL308", message, tree)
+                return None
+        span = self.span(tree)
+        total = reduce(
+            lambda one, other: _combined("+", one, other, span),
+            [_combined("*", one, other, span) for one, other in zip(*vectors, strict=True)],
+        )
+        return t.Operation(t.Builtin.SQRT, (widen(total),), s.REAL, span) if name == "norm" else total
 
     # --- collections -------------------------------------------------------------------------------------------------
 
@@ -383,6 +414,12 @@ def _is_open(tree: syntax.TermSyntax) -> bool:
     if isinstance(tree, syntax.TupleDisplay):
         return any(_is_open(term) for term in tree.items)
     return isinstance(tree, syntax.SequenceDisplay | syntax.SetDisplay) and not tree.items
+
+
+def _items(vector: t.Term) -> Sequence[t.Term]:
+    """The items of a tuple or record; none of another term."""
+    sorts = vector.sort.items if isinstance(vector.sort, s.TupleSort) else ()
+    return [t.Item(vector, k, sort, vector.span).rebuild((vector,)) for k, sort in enumerate(sorts)]
 
 
 def _combined(operator: str, left: t.Term, right: t.Term, span: Span) -> t.Arithmetic:

@@ -98,6 +98,8 @@ def may_lack_value(term: t.Term) -> bool:
             match operator:
                 case t.Builtin.XOR | t.Builtin.ABS | t.Builtin.MIN | t.Builtin.MAX | t.Builtin.MOD | t.Builtin.DIV:
                     return False  # the divisor of `mod` and `div` is a positive literal
+                case t.Builtin.SQRT:
+                    return True
                 case _:
                     assert_never(operator)
         case t.Argument():
@@ -161,6 +163,10 @@ def _risks(atom: t.Term, sequences: Collection[t.Variable] | None, facts: Facts)
             asked = [t.Compare(sign, right, t.Literal(Fraction(0), REAL), atom.span) for sign in ("!=", ">", "<")]
             if not any(_follows(each, facts) for each in asked):
                 yield asked[0]
+        case t.Operation(operator=t.Builtin.SQRT, arguments=(inner,)) if sequences is None:
+            wanted = t.Compare(">=", inner, t.Literal(Fraction(0), REAL), atom.span)
+            if not (_is_never_negative(inner) or _follows(wanted, facts)):
+                yield wanted
         case t.History(operator=t.Past.PREVIOUS | t.Past.CHANGED) if atom.arguments[0].sort != BOOL:
             yield from _risks_before(atom, sequences, facts)
             return
@@ -212,6 +218,20 @@ def _denial(term: t.Term) -> t.Term:
 
 
 # -- what plainly follows from guards: sums of numbers that are compared -----------------------------------------------
+
+
+def _is_never_negative(term: t.Term) -> bool:
+    """Whether it is plainly a sum or product of squares, of numbers without sign, and of numbers that are written."""
+    match term:
+        case t.Arithmetic(operator="*", left=left, right=right) if left == right:
+            return True
+        case t.Arithmetic(operator="+" | "*" | "/") | t.Widen():
+            return all(map(_is_never_negative, term.children))
+        case t.Operation(operator=t.Builtin.ABS | t.Builtin.SQRT):
+            return True
+    number = constant(term)
+    return term.sort == NATURAL or (number is not None and number >= 0)
+
 
 _Sum = dict[t.Term, Fraction]
 _ONE = t.Literal(1, INTEGER)

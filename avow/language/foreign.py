@@ -51,7 +51,7 @@ SIGNS: dict[str, Foreign] = {
     **_as("FALSE", "FALSE", "⊥"),
     **_as("STAR", "*", "·", "⋅", "•", "∗"),
     **_as("STAR", "*", "^", "**", hint="RCL has no powers: write `x * x`"),
-    **_as("STAR", "*", "%", hint="write `mod(a, 3)`"),
+    **_as("STAR", "*", "%", hint="write `mod(a, 3)` for a remainder, 0.9 for 90 percent"),
     **_as("SLASH", "/", "÷", "∕"),
     **_as("MINUS", "-", "−", "–", "—"),
     **_as("NAME", "x", "×", hint="write `x` between types, `*` between numbers"),
@@ -96,8 +96,9 @@ _HINTS = {
     "write `TRUE`": "true",
     "write `FALSE`": "false",
     _ONE_STEP: "always globally finally previously old pre prev last",
-    "RCL has `+ - * /`, `abs`, `min`, `max`, `mod`, `div`, and no other functions of numbers": "sqrt sin cos tan atan2 "
-    "pow exp log floor ceil round norm hypot dist distance fabs magnitude minimum maximum remainder quotient",
+    "RCL has `+ - * /`, `abs`, `min`, `max`, `mod`, `div`, `sqrt`, and no other functions of numbers": "sin cos tan "
+    "atan2 pow exp log floor ceil round fabs minimum maximum remainder quotient",
+    "write `sqrt(r)`, `norm(x, y)`, `dot(v, w)`": "sqrt norm dot hypot dist distance magnitude scalar",
     "write the length of a sequence as `length(s)`": "len size count card length",
     "write a range as `<a upto b>`, both ends included": "range seq to",
     "write `a and b`, `a or b`, `not a`, `a -> b`, `a <=> b`, `xor(a, b)`": "and or not implies then iff equiv xor",

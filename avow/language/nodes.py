@@ -254,7 +254,8 @@ def _goes_with(topic: Topic, earlier: Sequence[Topic], name: Token, reports: Rep
         return True
     types = f", as {other.kind} and as {topic.kind}" if _same(other) != _same(topic) else ""
     message = f"the topic `{topic.name}` is listed twice{types}"
-    hint = "a topic has one type and one frame, and is listed once, or once for each variable with `matches(…)`"
+    hint = "list a topic once, or once for each variable with `matches(…)`"
+    hint = "correct one of them: a topic has one type and one frame" if types else hint
     notes = ((f"`{topic.name}` is first listed here", other.span),)
     reports.error("RCL216", message, name.start, name.end, hint=hint, notes=notes)
     return False

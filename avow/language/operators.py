@@ -19,7 +19,8 @@ from typing import Any, assert_never
 from avow.base.diagnostics import Span
 from avow.base.plain import count
 from avow.base.records import dataclass
-from avow.language.conversions import NUMERIC, WHOLE, common, joined
+from avow.language.conversions import NUMERIC, WHOLE, common, joined, widen
+from avow.language.roots import quotient, root
 from avow.language.sorts import BOOL, INTEGER, NATURAL, REAL, FunctionSort, SetSort, Sort
 from avow.language.terms import Builtin, Compare, Conditional, Iff, Literal, Negative, Not, Operation, Term
 
@@ -56,6 +57,7 @@ class Typing(StrEnum):
     NUMBER = "number → number"
     NUMBERS = "numbers → number"
     QUOTIENT = "numbers → REAL"
+    ROOT = "number → REAL"
     WHOLE = "whole number, positive literal → whole number"
     BRANCHES = "formula, two terms of one type → that type"
 
@@ -90,7 +92,7 @@ class Operator:
     because z3 creates its own numbers in another context."""
     smtlib: str
     """The head of its form in the scripts that Z3 prints."""
-    dafny: str
+    dafny: str | Why
     """The infix sign, or the function of the generated module that it calls."""
     rml: str | Why
     """The sign in an RML condition; or `lifted`: conditions distinguish the cases."""
@@ -106,6 +108,7 @@ class Operator:
 LIFTED = "lifted"
 _IN_PARTS = Why("its parts are evaluated one after another, as far as they are needed")
 _NO_WHOLE_DIVISION = Why("RML's conditions have neither whole division nor remainder")
+_NO_ROOT_THERE = Why("its language has no square roots")
 _NOT_COMPUTED = Why("programs say it with IF")
 _A_FORM = Why("it is a form of the terms itself, of as many parts as the form has")
 _ARITHMETIC = Why("it is arithmetic: no form of the terms says it")
@@ -130,9 +133,9 @@ def _function(
     name: Builtin,
     typing: Typing,
     evaluate: Callable[..., Any],
-    z3: Callable[..., Any],
+    z3: Callable[..., Any] | Why,
     smtlib: str,
-    dafny: str,
+    dafny: str | Why,
     rml: str | Why,
     definition: Callable[[Operation], Term] | Why,
     takes: tuple[int, int | None],
@@ -191,7 +194,7 @@ _ROWS = (
     _infix("-", Level.SUM, Typing.NUMBERS, "-", operator.sub, lambda z, a, b: a - b, "-", "-", "-"),
     _infix("*", Level.PRODUCT, Typing.NUMBERS, "·", operator.mul,
            lambda z, a, b: a * b, "*", "*", "*"),
-    _infix("/", Level.PRODUCT, Typing.QUOTIENT, "/", lambda a, b: Fraction(a) / b,
+    _infix("/", Level.PRODUCT, Typing.QUOTIENT, "/", quotient,
            lambda z, a, b: a / b, "/", "Types.Divide", "/"),
     _function(Builtin.XOR, Typing.FORMULAS, operator.ne, lambda z, a, b: z.Xor(a, b), "xor", "!=", LIFTED,
               _differing, (2, 2)),
@@ -205,6 +208,8 @@ _ROWS = (
               _ARITHMETIC, (2, 2)),
     _function(Builtin.DIV, Typing.WHOLE, operator.floordiv, lambda z, a, b: a / b, "div", "/", _NO_WHOLE_DIVISION,
               _ARITHMETIC, (2, 2)),
+    _function(Builtin.SQRT, Typing.ROOT, root, Why("the translation names the root, and states its square"), "*",
+              _NO_ROOT_THERE, _NO_ROOT_THERE, _ARITHMETIC, (1, 1)),
     Operator("if", Level.LOOSEST, Typing.BRANCHES, "if ", "if ", _IN_PARTS, lambda z, c, a, b: z.If(c, a, b),
              "ite", "if", LIFTED, _NOT_COMPUTED, _A_FORM, _A_FORM),
 )  # fmt: skip
@@ -261,10 +266,12 @@ def operation(name: Builtin, arguments: Sequence[Term], span: Span | None) -> Te
                 if argument.sort != BOOL:
                     return Mistyped("RCL301", f"`{name}` is of formulas, and this is of type {{}}", k)
             return Operation(name, tuple(arguments), BOOL, span)
-        case Typing.NUMBER | Typing.NUMBERS:
+        case Typing.NUMBER | Typing.NUMBERS | Typing.ROOT:
             for k, argument in enumerate(arguments):
                 if not isinstance(argument.sort, NUMERIC):
                     return Mistyped("RCL308", f"`{name}` is of numbers, and this is of type {{}}", k)
+            if typing is Typing.ROOT:
+                return Operation(name, tuple(map(widen, arguments)), REAL, span)
             made = common(list(arguments))
             assert made is not None, "numbers have a common sort"
             sort = joined(made)

@@ -132,9 +132,8 @@ class _OutlineReader:
 
     def open_brace(self, what: str) -> Token | None:
         if self.kind() != "LBRACE":
-            self.complain(
-                "RCL113", f"expected `{{` after {what} and not %", "names are made of letters, digits and `_`"
-            )
+            hint = "write `{` there" if self.kind() in _SECTIONS else "names are made of letters, digits and `_`"
+            self.complain("RCL113", f"expected `{{` after {what} and not %", hint)
             for ahead in range(1, 5):  # the rest of an invalid name
                 if self.kind(ahead) in _SECTIONS or (self.kind(ahead) in _TOP and self.kind(ahead - 1) != "MINUS"):
                     return None

@@ -47,7 +47,8 @@ def differences(sentence: str, formula: t.Term, elements: Mapping[str, str]) -> 
 
 
 def elements_of(nodes: Iterable[Node]) -> dict[str, str]:
-    """The elements and constructors of the nodes' types, by their lower-case names."""
+    """The elements and constructors of the nodes' types, by lower-case words: an element's name, as its forms may be
+    ordinary verbs (`sprays` beside the mode `spray`), and the forms of a constructor, as of a verb with its objects."""
     sorts = components(*(port.sort for node in nodes for port in (*node.inputs, *node.outputs)))
     names: dict[str, str] = {}
     for sort in sorts:
@@ -55,8 +56,14 @@ def elements_of(nodes: Iterable[Node]) -> dict[str, str]:
             case EnumSort(members=members):
                 names |= {name.lower(): name for name in members}
             case DataSort(constructors=constructors):
-                names |= {c.name.lower(): c.name for c in constructors}
+                names |= {form: c.name for c in constructors for form in _forms(c.name.lower())}
     return names
+
+
+def _forms(verb: str) -> Iterator[str]:
+    """``stop``, ``stops``, ``stopped``, ``stopping``, ``moving``."""
+    yield from (verb, f"{verb.removesuffix('e')}ing")
+    yield from (f"{verb}{double}{ending}" for double in ("", verb[-1:]) for ending in ("s", "es", "d", "ed", "ing"))
 
 
 # --- comparisons -----------------------------------------------------------------------------------------------------
@@ -278,25 +285,11 @@ _EXCEPT = re.compile(
 
 
 def mentions(sentence: str, names: Mapping[str, str]) -> Iterator[tuple[str, str]]:
-    """The words by which the sentence mentions one of the names affirmatively, each with the name: ``stop`` is
-    mentioned by ``stop``, ``stops``, ``stopped`` and ``stopping``, but not in an exception (``neither low nor high`` is
-    normal). `names` maps lower-case forms to names; those of one or two letters are ignored."""
+    """The words by which the sentence mentions one of the names affirmatively, each with the name; not in an exception
+    (``neither low nor high`` is normal). `names` maps lower-case forms to names; those of one or two letters are
+    ignored."""
     for word in re.finditer(r"[A-Za-z_][\w']*", sentence):
-        for stem in _stems(word[0].lower()):
-            if stem in names and stem not in _COMMON and len(stem) > 2:
-                if not _EXCEPT.search(re.split(r"[.;:]", sentence[: word.start()])[-1]):
-                    yield word[0], names[stem]
-                break
-
-
-def _stems(word: str) -> Iterator[str]:
-    """The words of which the word may be a form, itself first."""
-    yield word
-    for ending in ("s", "es", "d", "ed", "ing"):
-        if word.endswith(ending):
-            stem = word.removesuffix(ending)
-            yield stem
-            if ending == "ing":
-                yield stem + "e"
-            if ending in ("ed", "ing") and stem[-2:-1] == stem[-1:]:
-                yield stem[:-1]
+        name = names.get(word[0].lower(), "")
+        before = re.split(r"[.;:]", sentence[: word.start()])[-1]
+        if len(name) > 2 and name.lower() not in _COMMON and not _EXCEPT.search(before):
+            yield word[0], name

@@ -45,6 +45,11 @@ class Builtin(StrEnum):
     MAX = "max"
     MOD = "mod"
     DIV = "div"
+    SQRT = "sqrt"
+
+
+CALLED = ("length", "indices", "norm", "dot")
+"""Words that are written like operators, and stand for other terms."""
 
 
 class Past(StrEnum):

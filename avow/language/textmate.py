@@ -12,7 +12,7 @@ from typing import Any
 from avow.base.codec import document
 from avow.language.lexer import KEYWORDS, LONG_UNITS, STEPS, SYMBOLS, UNITS
 from avow.language.operators import OPERATORS
-from avow.language.terms import Builtin, Past
+from avow.language.terms import CALLED, Builtin, Past
 
 SCOPE = "source.rcl"
 _STRUCTURE = ("context", "node", "inputs", "outputs", "topics", "matches", "define", "assume", "guarantee")
@@ -25,7 +25,7 @@ def grammar() -> dict[str, Any]:
     """The grammar, as plain data."""
     types = [word for word, kind in KEYWORDS.items() if kind == "BUILTIN"]
     infix = [word for word in KEYWORDS if word not in (*_STRUCTURE, *_CONTROL, *_CONSTANTS, *types)]
-    called = sorted({*Builtin, *Past, "length", "indices"} - set(KEYWORDS))
+    called = sorted({*Builtin, *Past, *CALLED} - set(KEYWORDS))
     signs = sorted(
         (set(SYMBOLS) | {name for name in OPERATORS if not name.isalpha()}) - _PUNCTUATION,
         key=lambda sign: (-len(sign), sign),

@@ -93,6 +93,8 @@ class _Reader:
                     NUMBER if _is_number(side) else part for side, part in zip((left, right), parts, strict=True)
                 ]
                 return _product(factors[0], factors[1], sign)
+            case t.Operation(operator=t.Builtin.SQRT):
+                return _root(parts[0])
             case t.Arithmetic() | t.Compare() | t.Operation() | t.Conditional():
                 of = parts[1:] if isinstance(term, t.Conditional) else parts
                 return self.same(term, term.children[-len(of) :], of)
@@ -128,6 +130,13 @@ def _is_number(term: t.Term) -> bool:
     return (isinstance(term, t.Literal) and not term.unit) or (
         bool(term.children) and all(map(_is_number, term.children))
     )
+
+
+def _root(square: _Found) -> _Found:
+    """Half of each exponent; a unit with an odd one has no root that is a unit, and is not compared."""
+    if square is None or any(n % 2 for n in square.values()):
+        return None
+    return _whole({base: n // 2 for base, n in square.items()})
 
 
 def _product(one: _Found, other: _Found, sign: str) -> _Found:

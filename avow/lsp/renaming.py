@@ -18,12 +18,12 @@ from avow.language.contract import Contract
 from avow.language.lexer import KEYWORDS, LIMITED
 from avow.language.load import check_in_part
 from avow.language.source import Source
-from avow.language.terms import Builtin, Past
+from avow.language.terms import CALLED, Builtin, Past
 from avow.lsp.names import OWNED, PORTS, Meaning, Occurrence, What, occurrences, taken_apart
 from avow.lsp.plan_names import PlanText, plan_occurrences
 from avow.lsp.project import Project, faults_of_plan
 
-_WORDS = {*KEYWORDS, *LIMITED, *Builtin, *Past, "length", "indices"}
+_WORDS = {*KEYWORDS, *LIMITED, *Builtin, *Past, *CALLED}
 """Words of the language, including operators that a name may shadow: such a name would have two readings."""
 
 

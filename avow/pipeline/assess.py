@@ -89,7 +89,7 @@ def render(state: State, surveyed: Survey) -> Result:
         result = known.result
     else:
         case = build(state, surveyed, basis)
-        state.cases[surveyed.system.name] = key, case
+        state.cases[surveyed.system.name] = case
         place = state.workspace.report(surveyed.system.name)
         parts = Parts(None if state.run.fresh else place, report_digest())
         written = render_all(case, place, signing_key(), parts)
@@ -114,7 +114,7 @@ def certify(state: State, surveyed: Survey) -> KernelRun:
     entries = counting_now(ledger, workspace.root, system, state.run)
     found = kernel_run(entries, workspace.root, system, state.run)
     twice = sum(one.solvers > 1 for one in found.established)
-    state.certified[system.name] = f"{len(found.established)} proofs established again, {twice} of them by two solvers"
+    state.certified[system.name] = f"proofs established again: {len(found.established)}, by two solvers: {twice}"
     return found
 
 
@@ -134,9 +134,9 @@ def gate(state: State, surveyed: Survey) -> TaskError | bool:
 
 
 def case_of(state: State, surveyed: Survey) -> Case:
-    """The case that the report was made from, if it is current; otherwise a new one. Raises Rejected."""
-    made, basis = state.cases.get(surveyed.system.name), _basis(state, surveyed, _ledger(state, surveyed))
-    return made[1] if made is not None and made[0] == _key(state, surveyed, basis) else build(state, surveyed, basis)
+    """The case of the report that this run wrote; otherwise a new one. Raises Rejected."""
+    made = state.cases.get(surveyed.system.name)
+    return made if made is not None else build(state, surveyed, _basis(state, surveyed, _ledger(state, surveyed)))
 
 
 def as_it_is(surveyed: Survey, contracts: Workspace, ledger: Path) -> Case:

@@ -28,7 +28,7 @@ from avow.system.parameters import with_parameters
 from avow.system.plan import Located, Method, System
 from avow.system.rosgraph import account
 from avow.system.statements import expired, not_validated, requirement_sentences, without_words
-from avow.system.topics import heard, turned, unknown_types
+from avow.system.topics import heard, several, turned, unknown_types
 
 
 def diagnostics(
@@ -51,6 +51,7 @@ def of_plan(
         *launched.told(system),
         *unknown_types(system.plan, system.contract),
         *turned(system.plan, system.contract),
+        *several(system.plan, system.contract),
         *code_ends.checked(system),
         *_model(system),
         *_policy(system),
@@ -180,7 +181,8 @@ def _method(
 
 
 def _right(schema: Mapping[str, Any], options: Located) -> tuple[Located, tuple[Span, ...]]:
-    """The options, and the entries of options, that are correct by themselves; and the places of the others."""
+    """The options, and the entries of tables, that are correct by themselves; and the places of the others. What else
+    an option has may mean something else beside a faulty part."""
     if not isinstance(options.data, Mapping):
         return options, ()
     properties = {"properties": schema.get("properties", {})}
@@ -192,7 +194,8 @@ def _right(schema: Mapping[str, Any], options: Located) -> tuple[Located, tuple[
     right: dict[str, Any] = {}
     without: list[Span] = []
     for key, value in options.data.items():
-        parts = {part: {part: inner} for part, inner in value.items()} if isinstance(value, Mapping) else {}
+        table = isinstance(value, Mapping) and properties["properties"].get(key, {}).get("additionalProperties")
+        parts = {part: {part: inner} for part, inner in value.items()} if table else {}
         kept = [part for part in parts.values() if fine(key, part)]
         if fine(key, value):
             right[key] = value

@@ -106,10 +106,10 @@ def method_slice(
     told_of_itself = told_too(tool, job) if own in sources else frozenset[str]()
     sources = (sources | upstream) - {own}
     contract = job.contract
+    places = _places(contract)
     nodes = tuple(
-        _own(job, named, upstream, sentences) if n.name == own else _other(n, upstream)
-        for n in contract.nodes
-        if n.name == own or n.name in sources
+        _own(job, named, upstream, sentences) if name == own else _other(contract.node(name), upstream)
+        for name in sorted(places.keys() & {own, *sources}, key=places.__getitem__)
     )
     cut = replace(
         _bare(plan),
@@ -127,6 +127,12 @@ def method_slice(
     cut_contract = Contract((), named.types(contract), named.constants(contract), nodes, told)
     further = None if job.further is None else tuple(map(_bare_further, job.further))
     return MethodSlice(System(cut, cut_contract), job.node.name, job.method.id, further)
+
+
+@by_identity(20)
+def _places(contract: Contract) -> dict[str, int]:
+    """Node → its place in the contract."""
+    return {node.name: at for at, node in enumerate(contract.nodes)}
 
 
 def _own(job: Job, named: Named, upstream: Collection[str], sentences: bool) -> Node:

@@ -29,8 +29,8 @@ class State:
     """Every system that could be read; none if nothing had to be read."""
     changed: list[str] = field(default_factory=list)
     """The systems whose report was written anew."""
-    cases: dict[str, tuple[str, Case]] = field(default_factory=dict)
-    """System → its latest case, and the case's key."""
+    cases: dict[str, Case] = field(default_factory=dict)
+    """System → the case of its report, where this run wrote it."""
     certified: dict[str, str] = field(default_factory=dict)
     """System → what the kernel re-established in this run, in words."""
     read: bool = False

@@ -24,11 +24,9 @@ from avow.assurance.naming import short
 from avow.assurance.remarks import REMARK
 from avow.assurance.traceability import Row
 from avow.backend_kit.timeline import in_words, picture, timelines
-from avow.base.files import sha256, write
-from avow.base.notes import cache_folder, sealed, unsealed
 from avow.base.plain import count
 from avow.base.records import dataclass
-from avow.base.remembered import by_identity
+from avow.base.remembered import Kept, by_identity
 from avow.base.tuning.shown import FINDING_CHARACTERS, GUARANTEE_ROWS, OBLIGATIONS_IN_FULL, ROWS_UNFOLDED
 from avow.evidence.obligation import SYSTEM_LEVEL, Kind
 from avow.evidence.record import IN_PART
@@ -51,22 +49,18 @@ class Compiled(BytecodeCache):
     forged or made by another version of Jinja is ignored and compiled again.
     """
 
+    def __init__(self) -> None:
+        self._kept = Kept("templates", Path(__file__))
+
     def load_bytecode(self, bucket: Bucket) -> None:
-        kept = unsealed(_compiled(bucket))
+        kept = self._kept.get(bucket.key, __version__)
         if kept is not None:
             bucket.load_bytecode(io.BytesIO(kept))
 
     def dump_bytecode(self, bucket: Bucket) -> None:
         made = io.BytesIO()
         bucket.write_bytecode(made)
-        try:
-            write(_compiled(bucket), sealed(_compiled(bucket), made.getvalue()))
-        except OSError:  # a read-only home: the templates are compiled in each run
-            return
-
-
-def _compiled(bucket: Bucket) -> Path:
-    return cache_folder() / "templates" / sha256(f"{__version__} {bucket.key}")
+        self._kept.put(bucket.key, __version__, made.getvalue())
 
 
 @cache

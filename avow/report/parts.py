@@ -7,11 +7,8 @@ the user's cache under the user's seal, one file for each node, and a missing or
 
 from __future__ import annotations
 
-import contextlib
 import dataclasses
 import json
-import pickle
-import shutil
 import sys
 from collections.abc import Callable, Mapping
 from functools import cache
@@ -22,13 +19,12 @@ from typing import Any, ParamSpec
 import jinja2
 import yaml
 
-from avow.base.files import PART, is_intact, sha256, write
-from avow.base.notes import cache_folder, sealed, unsealed
-from avow.base.tuning.sizes import SHELVES
+from avow.base.files import is_intact, sha256
+from avow.base.remembered import Kept
 from avow.evidence.ledger import Entry
 
 P = ParamSpec("P")
-_Kept = dict[str, tuple[str, str]]
+_Parts = dict[str, tuple[str, str]]
 """Kind of part → its key and its text."""
 
 
@@ -38,10 +34,10 @@ class Parts:
     def __init__(self, folder: Path | None = None, *given: str) -> None:
         """`folder`: of the report; None: nothing is kept. `given`: what every part depends on."""
         self.folder = folder
-        self._place = cache_folder() / "parts" / sha256(str(folder.absolute())) if folder is not None else None
-        self._given = (sys.version, jinja2.__version__, yaml.__version__, *given)
-        self._kept: dict[str, _Kept] = {}
-        self._used: dict[str, _Kept] = {}
+        self._place = Kept("parts", folder) if folder is not None else None
+        self._given = sha256("\n".join((sys.version, jinja2.__version__, yaml.__version__, *given)))
+        self._kept: dict[str, _Parts] = {}
+        self._used: dict[str, _Parts] = {}
         self._new: set[str] = set()
         self._digests: dict[int, tuple[object, str]] = {}
 
@@ -64,10 +60,10 @@ class Parts:
 
     def _known(self, node: str, kind: str, *args: object, **kwargs: object) -> tuple[str, str | None]:
         """The key of a part, and its text if it is kept."""
-        key = sha256("".join((*self._given, *map(self._digest, (*args, *kwargs.values())))))
+        assert self._place is not None
+        key = sha256("".join(map(self._digest, (*args, *kwargs.values()))))
         if node not in self._kept:
-            data = unsealed(self._file(node))
-            self._kept[node] = pickle.loads(data) if data is not None else {}
+            self._kept[node] = self._place.get(node, self._given) or {}
         found = self._kept[node].get(kind)
         if found is None or found[0] != key:
             return key, None
@@ -81,22 +77,10 @@ class Parts:
 
     def keep(self) -> None:
         """Write the files of nodes with a new part, and remove those of nodes that are gone."""
-        if self._place is None:
-            return
-        with contextlib.suppress(OSError):  # with a read-only home everything is made each time
+        if self._place is not None:
             for node in self._new:
-                write(self._file(node), sealed(self._file(node), pickle.dumps(self._used[node])))
-            files = {self._file(node) for node in self._used}
-            for path in self._place.iterdir():
-                if path not in files and path.suffix != PART:
-                    path.unlink()
-            reports = sorted(self._place.parent.iterdir(), key=lambda path: path.stat().st_mtime)
-            for place in reports[: -SHELVES or None]:
-                shutil.rmtree(place, ignore_errors=True)
-
-    def _file(self, node: str) -> Path:
-        assert self._place is not None
-        return self._place / sha256(node)
+                self._place.put(node, self._given, self._used[node])
+            self._place.tidy()
 
     def _digest(self, value: object) -> str:
         """Digest of frozen data. A node's views (`wording.of_nodes`) are an argument of several parts."""

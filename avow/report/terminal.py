@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
@@ -31,7 +33,7 @@ _COLOURS = {"good": "green", "fair": "blue", "open": "yellow", "bad": "red", "am
 
 def show_obligation(case: Case, view: ObligationView, console: Console | None = None) -> None:
     """Print everything known about an obligation."""
-    out = console or Console(highlight=False, emoji=False)
+    out = console or Console(highlight=False, emoji=False, soft_wrap=not sys.stdout.isatty())
     o = view.obligation
     required = next((r for r in case.requirements if view.id in r.obligations), None)
     stands, meaning, formula = _status(view.standing), MEANINGS[view.standing], o.formula

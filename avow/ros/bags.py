@@ -30,6 +30,10 @@ LIVE = "_live"
 """Marks an event that was received on a running graph, where each topic has its own connection: the order in which such
 events arrived is not the causal order."""
 
+LOST, GONE = "_lost", "_gone"
+"""Mark an event of a topic that is no message, with the reason: some messages were not heard, so the record is no
+evidence about the topic; or nobody publishes it any more, so its values are unknown until the next message."""
+
 WHOLE = "_message"
 """The key of an event's whole message, if the message has fields with the names in `ENVELOPE`."""
 
@@ -84,7 +88,7 @@ def fields_of(event: Event) -> dict[str, Any]:
     whole = event.get(WHOLE)
     if isinstance(whole, Mapping):
         return {**whole}
-    return {name: value for name, value in event.items() if name not in (*ENVELOPE, PUBLISHER, LIVE, CALL)}
+    return {name: value for name, value in event.items() if name not in (*ENVELOPE, PUBLISHER, LIVE, LOST, GONE, CALL)}
 
 
 def publisher(event: Event) -> str:
@@ -219,18 +223,19 @@ def _opened(path: Path, origin: Origin) -> Iterator[Any]:
         yield reader
 
 
-def _metadata(path: Path) -> str:
-    """A bag's metadata.yaml; empty if there is none."""
-    with suppress(OSError):
-        return read_text(path / "metadata.yaml", "utf-8", errors="replace")
-    return ""
+def _beginning(path: Path, size: int = 8) -> bytes:
+    """The first bytes of a file; empty if it cannot be read."""
+    with suppress(OSError), path.open("rb") as file:
+        return file.read(size)
+    return b""
 
 
 _RECOVERED = {
-    ".db3": "sqlite3 {0} .recover | sqlite3 whole.db3",
-    ".mcap": "mcap recover {0} -o whole.mcap",
-    ".bag": "rosbag reindex {0}",
+    ".db3": (b"SQLite", "sqlite3 {0} .recover | sqlite3 whole.db3"),
+    ".mcap": (b"\x89MCAP", "mcap recover {0} -o whole.mcap"),
+    ".bag": (b"#ROSBAG", "rosbag reindex {0}"),
 }
+"""How the files of bags begin, and what restores one that was cut off."""
 
 
 @contextmanager
@@ -249,14 +254,17 @@ def _readable(path: Path) -> Iterator[None]:
         if "type definition" in why:
             hint = "the bag holds no definitions: name the distribution, `ros: {distro: humble}`, and `messages:`"
         elif stored:
-            hint = f"if it was cut off, `{_RECOVERED[stored.suffix].format(stored)}` restores its whole messages"
-            if stored.suffix == ".db3" and "storage_identifier: mcap" in _metadata(path):
+            begin, command = _RECOVERED[stored.suffix]
+            hint = f"if it was cut off, `{command.format(stored)}` restores its whole messages"
+            if not _beginning(stored).startswith(begin):
+                hint = f"{stored} is empty, or no {stored.suffix} file by its first bytes: copy the bag again"
+            elif stored.suffix == ".db3" and b"storage_identifier: mcap" in _beginning(path / "metadata.yaml", -1):
                 hint = f"metadata.yaml says mcap, and {stored.name} is sqlite3: correct its storage_identifier"
-        if path.is_dir() and not (path / "metadata.yaml").exists():
-            why, hint = (
-                "its folder has no metadata.yaml",
-                f"`ros2 bag reindex {path}` writes it from the recorded files",
-            )
+        if not files:
+            why, hint = "the folder is empty", "copy the bag again"
+        elif path.is_dir() and not (path / "metadata.yaml").exists():
+            why = "its folder has no metadata.yaml"
+            hint = f"`ros2 bag reindex {path}` writes it from the recorded files"
         raise NoBag(f"{path} cannot be read as a bag: {why}", hint) from None
 
 

@@ -14,7 +14,7 @@ from dataclasses import field, replace
 from typing import Any
 
 from avow.base.records import dataclass
-from avow.ros.definitions import Message
+from avow.ros.definitions import Definitions, Message
 from avow.ros.listing import Listed, Listing
 
 CALL_PARTS = ("Request", "Response", "Goal", "Result", "Feedback")
@@ -41,6 +41,15 @@ def is_part(topic: str) -> bool:
 def named(topic: str) -> str:
     """The contract's name for the topic of a part of calls: the service or the action."""
     return topic.rpartition("/")[0] if is_part(topic) else topic
+
+
+def pairing(kinds: Mapping[str, str], known: Definitions, *, looped: bool = False) -> str:
+    """How to say which input an answer answered, for a person to correct. `kinds`: topic → type, of all that is
+    received and published. By stamp if all are stamped, and no stamp comes back to the node (`looped`)."""
+    latency = "{latency: 10 ms, jitter: 2 ms, because: …}"
+    if any(map(is_part, kinds)):
+        return "{by: call}" if all(map(is_part, kinds)) else f"{{by: call, others: {latency}}}"
+    return "{by: stamp}" if all(map(known.stamped, kinds.values())) and not looped else latency
 
 
 def with_calls(listing: Listing) -> Listing:

@@ -16,7 +16,9 @@ from types import MappingProxyType
 from typing import Any
 from xml.sax.saxutils import quoteattr
 
+from avow.base.records import dataclass
 from avow.base.tuning.running import DDS_NAMES, DDS_PAUSE, DDS_SECONDS, LAST_DOMAIN
+from avow.ros.calls import is_part, named
 from avow.ros.listing import Listed, Listing, NoListing
 from avow.ros.names import is_name
 
@@ -25,16 +27,54 @@ LOOPBACK = ("127.0.0.1", "localhost")
 _TYPE = re.compile(r"(\w+)::(msg|srv|action)::dds_::(\w+)_\Z")
 _CALL = re.compile(r"r[qr](/.+?)(/_action/(?:send_goal|cancel_goal|get_result))?(?:Request|Reply)\Z")
 _PART = re.compile(r"(_SendGoal|_GetResult|_FeedbackMessage)?(_Request|_Response)?\Z")
+_OF_ACTION = re.compile(r"\w+_(Goal|Result|Feedback|FeedbackMessage|(SendGoal|GetResult)_(Request|Response))\Z")
 _NODES = "ros_discovery_info"
-
-
-def dds_topic(topic: str) -> str:
-    return f"rt/{topic.lstrip('/')}"
 
 
 def dds_type(kind: str) -> str:
     package, _, name = kind.partition("/")
-    return f"{package}::msg::dds_::{name}_"
+    folder = (
+        "action" if _OF_ACTION.match(name) else "srv" if name.endswith(("_Request", "_Response", "_Event")) else "msg"
+    )
+    return f"{package}::{folder}::dds_::{name}_"
+
+
+@dataclass(frozen=True, slots=True)
+class Carrier:
+    """A DDS topic, and the ROS type of its samples. `recorded`: for a part of calls, the topic of a bag that holds it.
+    `event`: for a service's samples, which begin with a header, the `event_type` of their event."""
+
+    topic: str
+    kind: str
+    recorded: str = ""
+    event: int | None = None
+
+
+def carriers(topic: str, kind: str) -> tuple[Carrier, ...]:
+    """What carries a topic, or a part of calls, over DDS; nothing for a response of an action's services. A result is
+    found by the request for it, which names the goal. The client's view of a call is in events (introspection)."""
+    name, part = (named(topic), topic.rpartition("/")[2]) if is_part(topic) else (topic, "")
+    bare, own = name.lstrip("/"), kind.rpartition("_")[0]
+
+    def service(called: str, kind: str, event: int) -> Carrier:
+        side, end = ("rq", "Request") if event == 1 else ("rr", "Reply")
+        return Carrier(f"{side}/{called.lstrip('/')}{end}", kind, f"{called}/_service_event", event)
+
+    match part:
+        case "":
+            return (Carrier(f"rt/{bare}", kind),)
+        case "_request" | "_response" if "/_action/" not in name:
+            return (service(name, kind, 1 if part == "_request" else 2),)
+        case "_request_sent" | "_response_received":
+            return (Carrier(f"rt/{bare}/_service_event", f"{own}_Event", f"{name}/_service_event"),)
+        case "_goal":
+            return (service(f"{name}/_action/send_goal", f"{own}_SendGoal_Request", 1),)
+        case "_result":
+            called = f"{name}/_action/get_result"
+            return tuple(service(called, f"{own}_GetResult_{end}", k) for k, end in ((1, "Request"), (2, "Response")))
+        case "_feedback":
+            return (Carrier(f"rt/{bare}/_action/feedback", f"{own}_FeedbackMessage", f"{name}/_action/feedback"),)
+    return ()
 
 
 def settings(host: str) -> str:
@@ -87,10 +127,10 @@ def ask_domain(domain: int, host: str = LOOPBACK[0], seconds: float = DDS_SECOND
         while time.monotonic() < until:
             time.sleep(DDS_PAUSE)
             for reader, writes in ((publications, True), (subscriptions, False)):
-                found = [end for end in _all(reader) if end.sample_info.valid_data]
+                found = [end for end in samples(reader) if end.sample_info.valid_data]
                 ends += [(end, writes) for end in found if end.participant_key not in own]
             for size, _, reader in listeners:
-                for sample in _all(reader):
+                for sample in samples(reader):
                     names |= dict(_announced(sample.data, size) or ()) if sample.sample_info.valid_data else {}
         del entity
     except DDSException as error:
@@ -195,9 +235,12 @@ class _Bytes:
         self.sample_info: Any = None
 
 
-def _all(reader: Any) -> Iterator[Any]:
-    while found := reader.take(100):
+def samples(reader: Any, most: int = 100) -> Iterator[Any]:
+    """The samples of a reader, at most so many at a time."""
+    while found := reader.take(most):
         yield from found
+        if len(found) < most:
+            return
 
 
 def _announced(data: bytes, size: int) -> list[tuple[bytes, str]] | None:

@@ -115,6 +115,11 @@ class Definitions:
         """The type of that name, as ROS 1 or ROS 2 writes it, or a built-in's message (``float64``)."""
         return self.messages.get(canonical(name))
 
+    def stamped(self, name: str) -> bool:
+        """Whether the type of that name is known, and has a header."""
+        message = self.get(name)
+        return message is not None and message.field("header") is not None
+
     def missing(self, message: Message) -> tuple[str, ...]:
         """The undefined types among those that a message is made of."""
         return tuple(name for name in self.within(message) if name not in self.messages)
@@ -274,14 +279,35 @@ def _scalar(name: str, package: str) -> Scalar | Nested:
 
 
 _PARTS = {"srv": ("Request", "Response"), "action": ("Goal", "Result", "Feedback")}
-_ANSWERS = {"SendGoal_Response": "bool accepted\nbuiltin_interfaces/Time stamp"}
-_ANSWERS |= {"GetResult_Response": "int8 status\n{0}_Result result"}
-"""The responses of an action's services (https://design.ros2.org/articles/actions.html)."""
+_WRAPPED = {
+    "srv": {"Event": "service_msgs/ServiceEventInfo info\n{0}_Request[<=1] request\n{0}_Response[<=1] response"},
+    "action": {
+        "SendGoal_Request": "unique_identifier_msgs/UUID goal_id\n{0}_Goal goal",
+        "SendGoal_Response": "bool accepted\nbuiltin_interfaces/Time stamp",
+        "GetResult_Request": "unique_identifier_msgs/UUID goal_id",
+        "GetResult_Response": "int8 status\n{0}_Result result",
+        "FeedbackMessage": "unique_identifier_msgs/UUID goal_id\n{0}_Feedback feedback",
+    },
+}
+"""The messages that ROS 2 makes of a service (REP 2012) and an action
+(https://design.ros2.org/articles/actions.html)."""
+_INFO = "uint8 event_type\nbuiltin_interfaces/Time stamp\nuint8[16] client_gid\nint64 sequence_number"
+
+
+def definition_file(name: str) -> tuple[str, tuple[str, ...]]:
+    """The file that defines a type, and the types that are its parts: ``my_msgs/srv/SetMode.srv`` for a part of that
+    service's calls."""
+    package, _, word = name.partition("/")
+    whole, _, part = word.partition("_")
+    kind = "srv" if part in _PARTS["srv"] else "action"
+    if not part.startswith((*_PARTS[kind], "SendGoal_", "GetResult_")):
+        return f"{package}/msg/{word}.msg", (name,)
+    return f"{package}/{kind}/{whole}.{kind}", tuple(f"{package}/{whole}_{each}" for each in _PARTS[kind])
 
 
 def parse_parts(text: str, name: str, kind: str, source: str = "") -> tuple[Message, ...]:
     """A ``.srv`` (``package/Type_Request``, ``…_Response``) or ``.action`` text (``…_Goal``, ``…_Result``,
-    ``…_Feedback``, and the responses of its services). Raises WrongDefinition."""
+    ``…_Feedback``), and the messages that ROS 2 makes of these. Raises WrongDefinition."""
     lines = text.splitlines()
     parts = [part.split("\n")[1:] for part in re.split(r"\n[ \t]*---[ \t]*(?=\n)", "\n".join(["", *lines, ""]))]
     wanted = _PARTS[kind]
@@ -297,8 +323,8 @@ def parse_parts(text: str, name: str, kind: str, source: str = "") -> tuple[Mess
         except WrongDefinition as wrong:
             raise WrongDefinition(str(wrong), wrong.line + before, wrong.hint) from None
         before += len(part) + 1
-    answers = _ANSWERS if kind == "action" else {}
-    return (*found, *(parse_message(answer.format(name), f"{name}_{end}", source) for end, answer in answers.items()))
+    made = ((f"{name}_{end}", text.format(name)) for end, text in _WRAPPED[kind].items())
+    return (*found, *(parse_message(text, whole, source) for whole, text in made))
 
 
 _LOOKUP = """\
@@ -316,8 +342,11 @@ TF2Error error
 """
 _GRIPPED = "float64 position\nfloat64 effort\nbool stalled\nbool reached_goal"
 STANDARD |= {
-    "control_msgs/GripperCommand": parse_message(
-        "float64 position\nfloat64 max_effort", "control_msgs/GripperCommand", "control_msgs"
+    name: parse_message(text, name, name.partition("/")[0])
+    for name, text in (
+        ("control_msgs/GripperCommand", "float64 position\nfloat64 max_effort"),
+        ("unique_identifier_msgs/UUID", "uint8[16] uuid"),
+        ("service_msgs/ServiceEventInfo", _INFO),
     )
 }
 for _name, _text in (

@@ -15,8 +15,8 @@ from typing import Any, assert_never
 from avow.base.graphs import components, cycles_in
 from avow.base.tuning.shown import DRAFTED_FIELDS, DRAFTED_WORDS
 from avow.ros.bags import message_of
-from avow.ros.calls import is_part, named
-from avow.ros.definitions import FLOATS, INTEGERS, Array, Definitions, Message, Nested, Scalar, Wire
+from avow.ros.calls import is_part, named, pairing
+from avow.ros.definitions import FLOATS, INTEGERS, Array, Definitions, Message, Nested, Scalar, Wire, definition_file
 from avow.ros.listing import Listed, Listing
 
 Path = tuple[str, ...]
@@ -72,10 +72,12 @@ class Seen:
 
 @dataclass(frozen=True, slots=True)
 class Drafted:
-    """The texts of a draft: the contract, the plan, and what was left out, for the plan's `model`."""
+    """The texts of a draft."""
 
     contract: str
     plan: str
+    unknown: tuple[str, ...]
+    """The files that are not known, of the types of topics that have no ports."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,7 +95,7 @@ class Given:
     traces: Mapping[str, str] = field(default_factory=dict)
     graph: str | None = None
     messages: Mapping[str, str] = field(default_factory=dict)
-    """Type → its definition, for those that the draft has a file for."""
+    """The files of definitions that the draft has, by their paths below `msg`."""
     seen: Mapping[tuple[str, Path], Seen] = field(default_factory=dict)
     unsaid: frozenset[str] = frozenset()
     """Nodes that are drafted as publishers without the record's confirmation."""
@@ -147,6 +149,8 @@ class _Draft:
     """Topic → the values that it carries."""
     silent: dict[str, list[str]] = field(default_factory=dict)
     """Topic → the fields that never had a reading, and their values: they become no ports."""
+    unknown: set[str] = field(default_factory=set)
+    """The files that would define types that are not known."""
     told: bool = False
     """Whether the traces have been written in full."""
 
@@ -164,7 +168,7 @@ class _Draft:
             "// replace each guarantee `to_write`, remove the ports that no clause needs, and say what is assumed.\n\n"
         )
         whole = head + (f"context {{\n{context}}}\n\n" if context else "") + bodies
-        return Drafted(whole, self.plan(nodes, dropped))
+        return Drafted(whole, self.plan(nodes, dropped), tuple(sorted(self.unknown)))
 
     def nodes(self) -> tuple[dict[str, Listed], dict[str, str]]:
         """The nodes to model, by their names in the contract; and those that are tools, with the reason."""
@@ -190,7 +194,9 @@ class _Draft:
     def of_topic(self, topic: str, short: str) -> Iterator[_Port]:
         kind = self.given.listing.types.get(topic, "")
         message = self.given.known.get(kind) if kind else None
-        if message is None or self.given.known.missing(message):
+        missing = self.given.known.missing(message) if message is not None else (kind,) if kind else ()
+        self.unknown.update(definition_file(each)[0] for each in missing)
+        if message is None or missing:
             return
         leaves = [leaf for leaf in self.given.known.leaves(message) if self.sort(leaf[1]) is not None]
         for path, wire, holder in leaves[:DRAFTED_FIELDS]:
@@ -391,16 +397,12 @@ class _Draft:
         return f"&recordings [{', '.join(told)}]"
 
     def stamped(self, topic: str) -> bool:
-        kind = self.given.known.get(self.given.listing.types.get(topic, ""))
-        return kind is not None and kind.field("header") is not None
+        return self.given.known.stamped(self.given.listing.types.get(topic, ""))
 
     def answers(self, node: Listed, looped: bool) -> str:
-        """By stamp if all that it receives and publishes is stamped, and no stamp comes back to it in a loop."""
         topics = [t for t in (*node.subscribes, *node.publishes) if self.ports.get(t)]
-        latency = "{latency: 10 ms, jitter: 2 ms, because: …}"
-        if any(map(is_part, topics)):
-            return "{by: call}" if all(map(is_part, topics)) else f"{{by: call, others: {latency}}}"
-        return "{by: stamp}" if all(map(self.stamped, topics)) and not looped else latency
+        kinds = {t: self.given.listing.types.get(t, "") for t in topics}
+        return pairing(kinds, self.given.known, looped=looped)
 
 
 def _constants(wire: Wire, name: str, holder: Message) -> dict[str, str]:

@@ -85,7 +85,7 @@ def parse_listing(text: str) -> Listing:
     if text.lstrip().startswith("{"):
         return _of_json(text)
     if not is_info(text):
-        raise NoListing("it is neither the output of `rosnode info` or `ros2 node info`, nor a JSON object")
+        raise NoListing("it is no JSON object, and no output of `ros2 node info NODE` (or `rosnode info`) of each node")
     return parse_info(text)
 
 

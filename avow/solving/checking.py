@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any, assert_never
 from typing import Literal as OneOf
 
@@ -14,7 +14,7 @@ from avow.solving.limits import NO_ANSWER, allowed, net, spend, steps
 from avow.solving.models import Model
 from avow.solving.translation import Expr, Translator
 from avow.solving.z3_module import z3
-from avow.solving.z3_sorts import Sorts
+from avow.solving.z3_sorts import Sorts, parts_of
 
 Status = OneOf["sat", "unsat", "unknown"]
 
@@ -168,6 +168,8 @@ def put(translator: Sorts, solver: Any, effort: float, seed: int | None = 0, *as
     """Check what a solver holds: every question to Z3 goes through here. Its steps bound it and are counted
     (`avow.solving.limits`); the clock only ends a call that hangs. Raises Z3Exception."""
     configured(solver, effort, seed)
+    if translator.session.roots:  # reading the assertions copies them, which costs time and can change the answer
+        solver.add(*(fact for _, fact in translator.root_facts(solver.assertions())))
     result = solver.check(*assumptions)
     charge(translator, solver)
     if result == z3.sat:
@@ -220,6 +222,7 @@ def _ask_qsat(
     translator: Translator, assertions: Sequence[Expr], tracked: Sequence[tuple[str, Expr]], effort: int
 ) -> tuple[Status, object | None, tuple[str, ...], str]:
     everything = [*assertions, *(expr for _, expr in tracked)]
+    everything += [fact for _, fact in translator.root_facts(everything)]
     tactic = "nlqsat" if _real_polynomials(everything) else "qsat"
     solver = z3.Tactic(tactic, ctx=translator.context).solver()
     solver.add(*everything)
@@ -233,12 +236,12 @@ def _ask_qsat(
 
 def _arithmetic_only(exprs: Iterable[Expr]) -> bool:
     """Whether only numbers and truth values occur: qsat is complete there, and its `unsat` is accepted."""
-    return all(z3.is_bool(e) or z3.is_arith(e) for e in _parts(exprs)) and not any(map(_is_applied, _parts(exprs)))
+    return all(z3.is_bool(e) or z3.is_arith(e) for e in parts_of(exprs)) and not any(map(_is_applied, parts_of(exprs)))
 
 
 def _real_polynomials(exprs: Iterable[Expr]) -> bool:
     """Whether only reals and truth values occur, and reals are multiplied: another engine supports these."""
-    parts = list(_parts(exprs))
+    parts = list(parts_of(exprs))
     plain = all(z3.is_bool(e) or z3.is_real(e) for e in parts) and not any(map(_is_applied, parts))
     divided = any(z3.is_div(e) and not z3.is_rational_value(e.arg(1)) for e in parts)
     return (
@@ -250,22 +253,6 @@ def _real_polynomials(exprs: Iterable[Expr]) -> bool:
 
 def _is_applied(expr: Expr) -> bool:
     return bool(z3.is_app(expr) and expr.num_args() and expr.decl().kind() == z3.Z3_OP_UNINTERPRETED)
-
-
-def _parts(exprs: Iterable[Expr]) -> Iterator[Expr]:
-    """Every subexpression once, without quantifiers themselves."""
-    seen: set[int] = set()
-    stack = list(exprs)
-    while stack:
-        expr = stack.pop()
-        if expr.get_id() in seen:
-            continue
-        seen.add(expr.get_id())
-        if z3.is_quantifier(expr):
-            stack.append(expr.body())
-        else:
-            yield expr
-            stack.extend(expr.children())
 
 
 def _minimal(

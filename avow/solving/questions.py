@@ -272,18 +272,18 @@ _INSIDE = "within the bounds"
 
 
 def _has_solution(asked: _Asked) -> bool:
-    """Whether formulas without quantifiers, functions and partial operations hold together: for these, the solver's
-    answer is right even if the solution cannot be written down."""
+    """Whether formulas without quantifiers, functions and sequences hold together where they have a value: for these,
+    the solver's answer is right even if the solution cannot be written down."""
     formulas = asked.labelled.values()
     parts = [part for formula in formulas for part in subterms(formula)]
-    if any(isinstance(part, Quantified | Apply) for part in parts) or any(map(is_partial, formulas)):
+    if any(isinstance(part, Quantified | Apply) or isinstance(part.sort, SequenceSort) for part in parts):
         return False
     if any(isinstance(v.sort, FunctionSort | OpaqueSort) for v in asked.free):
         return False
     try:
         translator = Translator()
         fixed = asked.fixed(translator)
-        facts = [translator.term(formula, fixed) for formula in formulas]
+        facts = [translator.term(part, fixed) for formula in formulas for part in (formula, defined(formula))]
         whole = [*translator.background(v for v in asked.free if v not in fixed), *facts]
         return check(translator, whole, effort=asked.effort, seed=asked.seed).status == "sat"
     except (Unsupported, z3.Z3Exception):

@@ -8,7 +8,7 @@ from avow.base.remembered import by_identity
 from avow.formulas.values import Value
 from avow.language.sorts import FunctionSort, OpaqueSort, SequenceSort, Sort, components
 from avow.language.subterms import subterms
-from avow.language.terms import Arithmetic, Quantified, Term, Variable
+from avow.language.terms import Arithmetic, Builtin, Operation, Quantified, Term, Variable
 from avow.solving.checking import Engine, check
 from avow.solving.limits import allowed
 from avow.solving.translation import Translator, Unsupported, same_session
@@ -97,8 +97,10 @@ def opaque_sorts(formula: Term) -> frozenset[OpaqueSort]:
 
 @by_identity(500)
 def is_partial(formula: Term) -> bool:
-    """Whether sequences or divisions occur."""
+    """Whether sequences, divisions or square roots occur."""
     return any(
-        isinstance(part.sort, SequenceSort) or (isinstance(part, Arithmetic) and part.operator == "/")
+        isinstance(part.sort, SequenceSort)
+        or (isinstance(part, Arithmetic) and part.operator == "/")
+        or (isinstance(part, Operation) and part.operator is Builtin.SQRT)
         for part in subterms(formula)
     )

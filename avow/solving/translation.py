@@ -21,7 +21,7 @@ from avow.language import sorts as s
 from avow.language import terms as t
 from avow.language.operators import OPERATORS, implementation
 from avow.solving.z3_module import z3
-from avow.solving.z3_sorts import Expr, Meaning, Sorts, Unsupported, kept_session, new_session, same_session
+from avow.solving.z3_sorts import Expr, Meaning, Sorts, Unsupported, kept_session, new_session, parts_of, same_session
 
 __all__ = ["Expr", "Meaning", "Translator", "Unsupported", "kept_session", "new_session", "same_session"]
 
@@ -141,6 +141,8 @@ class Translator(Sorts):
                 return self._real(*parts)
             case t.Negative():
                 return -parts[0]
+            case t.Operation(operator=t.Builtin.SQRT):
+                return self.root(self._real(*parts))
             case t.Operation(operator=name):
                 return implementation(OPERATORS[name].z3)(z3, *(self._fit(part, term.sort) for part in parts))
             case t.Conditional(sort=sort):
@@ -269,6 +271,10 @@ class Translator(Sorts):
         inner = {**bound, **dict(zip(term.variables, constants, strict=True))}
         body = yield self._term(term.body, inner, meanings)
         members = [self.member(v.sort, c) for v, c in zip(term.variables, constants, strict=True)]
+        for root, fact in self.root_facts([body]):
+            if not {c.get_id() for c in constants}.isdisjoint(part.get_id() for part in parts_of([fact])):
+                constants.append(root)  # it is another number for other values of the variables
+                members.append(fact)
         allowed = [member for member in members if member is not None]
         if term.quantifier is t.Quantifier.FORALL:
             return z3.ForAll(constants, z3.Implies(self._every(allowed), body) if allowed else body)
@@ -277,6 +283,8 @@ class Translator(Sorts):
             return z3.Exists(constants, within)
         if any(isinstance(variable.sort, s.FunctionSort) for variable in term.variables):
             raise Unsupported("unique existence of a function", term.span)
+        if len(constants) > len(term.variables):
+            raise Unsupported("a square root under `exists_unique`", term.span)
         others = [self.fresh(variable.name, variable.sort) for variable in term.variables]
         again = z3.substitute(within, *zip(constants, others, strict=True))
         equal = z3.And([one == other for one, other in zip(constants, others, strict=True)])

@@ -60,6 +60,8 @@ class Session:
     """Free variables as constants, or as functions."""
     formulas: dict[int, tuple[Term, Expr]] = field(default_factory=dict)
     """By the formula's identity, as formulas are deep."""
+    roots: dict[int, tuple[Expr, Expr]] = field(default_factory=dict)
+    """By the identity of an expression: a constant that is its square root, and the fact that it is."""
     steps: int = 0
     """Z3's steps in the context, as last counted."""
 
@@ -277,6 +279,25 @@ class Sorts:
         self._count += 1
         return z3.Const(f"{name}!{self._count}", self.sort(sort))
 
+    def root(self, square: Expr) -> Expr:
+        """A constant for the square root of an expression; `root_facts` say which number it is."""
+        roots = self.session.roots
+        if square.get_id() not in roots:
+            found = z3.Real(f"sqrt!{len(roots)}", self.context)
+            fact = z3.Implies(square >= 0, z3.And(found >= 0, found * found == square))
+            roots[square.get_id()] = found, fact
+        return roots[square.get_id()][0]
+
+    def root_facts(self, exprs: Iterable[Expr]) -> list[tuple[Expr, Expr]]:
+        """The square roots that occur in expressions, and in each other, with what determines each: it belongs to every
+        question about them. An inner root comes before an outer one."""
+        waiting, found = [*exprs], set[int]()
+        while waiting and self.session.roots:
+            inside = {part.get_id() for part in parts_of(waiting)} - found
+            waiting = [fact for root, fact in self.session.roots.values() if root.get_id() in inside]
+            found |= inside
+        return [pair for pair in self.session.roots.values() if pair[0].get_id() in found]
+
     def real(self, value: Fraction) -> Expr:
         return z3.RealVal(f"{value.numerator}/{value.denominator}", self.context)
 
@@ -370,3 +391,19 @@ class Sorts:
         if not units:
             return z3.Empty(self.sort(sort))
         return units[0] if len(units) == 1 else z3.Concat(*units)
+
+
+def parts_of(exprs: Iterable[Expr]) -> Iterator[Expr]:
+    """Every subexpression once, without quantifiers themselves."""
+    seen: set[int] = set()
+    stack = list(exprs)
+    while stack:
+        expr = stack.pop()
+        if expr.get_id() in seen:
+            continue
+        seen.add(expr.get_id())
+        if z3.is_quantifier(expr):
+            stack.append(expr.body())
+        else:
+            yield expr
+            stack.extend(expr.children())

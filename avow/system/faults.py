@@ -34,7 +34,7 @@ _STRING = re.compile(r'"[^"\n]*"|//[^\n]*')
 _OF_NAMES = re.compile("RCL[23]")
 _QUOTED = re.compile(r"'([^']*)'")
 _NODE = re.compile(r"\s*node\b")
-_NAMELESS = ("RCL001", "RCL215", "RCL219")
+_NAMELESS = ("RCL00", "RCL215", "RCL219")
 _CAUSES = ("PLAN105", "ROS101", "ROS111", "ROS104", "DRIVE101")
 _PACKAGE = re.compile(r"the package (\w+)")
 _TYPE = re.compile(r"\b(\w+)/(?:(?:msg|srv|action)/)?([A-Z]\w*?)(?:_(?:Request|Response|Goal|Result|Feedback))?\b")
@@ -85,7 +85,7 @@ def rest_of(folder: Path) -> Rest | None:
         return Rest(System(plan, contract), True, root, dropped, faults, wrong=wrong)
     words = frozenset(word for path in plan.contract_files for word in _WORD.findall(_text(path)))
     part = read_in_part(plan.contract_files)
-    lost = any(d.code in _NAMELESS or _begins_node(d) for d in found if d.is_error)
+    lost = any(d.code.startswith(_NAMELESS) or _begins_node(d) for d in found if d.is_error)
     return Rest(System(plan, part), False, root, dropped | words, faults, _doubtful(plan, part, found), wrong, lost)
 
 

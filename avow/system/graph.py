@@ -121,7 +121,9 @@ def wired(
     selves = {source for source, target in started if source == target}
     loops = [c for c in components(names, started) if len(c) > 1 or c[0] in selves]
     deadlocks = tuple(cycle for component in loops for cycle in cycles_in(component, started))
-    told = [] if spans is None else [_deadlock(cycle, edges, spans) for cycle in deadlocks]
+    relays = frozenset(node.name for node in nodes if node.relay)
+    own = {cycle: tuple(name for name in cycle if name not in relays) for cycle in deadlocks if spans is not None}
+    told = [_deadlock(shown, to_delay(cycle, edges, relays), spans or {}) for cycle, shown in own.items()]
     by_consumer: dict[str, list[Edge]] = defaultdict(list)
     by_provider: dict[str, list[Edge]] = defaultdict(list)
     for edge in edges:
@@ -134,7 +136,7 @@ def wired(
         dangling,
         deadlocks,
         (*faults, *told),
-        frozenset(node.name for node in nodes if node.relay),
+        relays,
         {edge.target: edge for edge in edges},
         {name: tuple(found) for name, found in by_consumer.items()},
         {name: tuple(found) for name, found in by_provider.items()},
@@ -319,17 +321,19 @@ def _several(target: Endpoint, names: list[str], port: Port) -> Diagnostic:
     return Diagnostic("PLAN122", message, port.span, hint=hint)
 
 
-def to_delay(cycle: tuple[str, ...], edges: Sequence[Edge]) -> str:
-    """What to write in the plan so that something comes first in a loop: the fewest connections that need it."""
+def to_delay(cycle: tuple[str, ...], edges: Sequence[Edge], relays: Collection[str]) -> str:
+    """What to write in the plan so that something comes first in a loop: the fewest connections that need it. One to a
+    relay is written to the input that the relay feeds."""
+    heard = {e.source.node: e.target for e in edges if e.source.node in relays}
     arcs = zip(cycle, (*cycle[1:], cycle[0]), strict=True)
     open_ = [e for e in edges if not (e.delayed and e.initial is not None)]
-    ways = [[e for e in open_ if (e.source.node, e.target.node) == arc] for arc in arcs]
+    ways = [[e for e in open_ if (e.source.node, e.target.node) == arc] for arc in arcs if arc[0] not in relays]
     way = min(reversed(ways), key=lambda way: sum(1 if e.delayed else 2 for e in way))
-    told = (f"{{from: {e.source}, to: {e.target}, delayed: true, initial: …}}" for e in way)
+    ends = ((e.source, heard.get(e.target.node, e.target)) for e in way)
+    told = (f"{{from: {source}, to: {target}, delayed: true, initial: …}}" for source, target in ends)
     return f"say what was there before the first step, for example  connections: [{', '.join(told)}]"
 
 
-def _deadlock(cycle: tuple[str, ...], edges: Sequence[Edge], spans: Mapping[str, Span | None]) -> Diagnostic:
-    shown = circle(cycle)
-    message = f"start-up deadlock: {shown} wait for one another and nothing comes first"
-    return Diagnostic("PLAN123", message, spans.get(cycle[0]), Severity.WARNING, to_delay(cycle, edges))
+def _deadlock(cycle: tuple[str, ...], advice: str, spans: Mapping[str, Span | None]) -> Diagnostic:
+    message = f"start-up deadlock: {circle(cycle)} wait for one another and nothing comes first"
+    return Diagnostic("PLAN123", message, spans.get(cycle[0]), Severity.WARNING, advice)

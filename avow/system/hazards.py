@@ -35,6 +35,7 @@ COLUMNS: Mapping[str, tuple[str, ...]] = {
     "mitigated_by": ("mitigated_by", "mitigated by", "mitigations", "constraints", "safety constraints"),
 }
 """Field of a hazard → the headings that it may have in a CSV file, in any case."""
+_HEADINGS = f"its first line has headings: {', '.join(COLUMNS)}"
 _SCHEMA = "avow.system", "hazards.schema.json"
 _LISTS = ("causes", "consequences", "mitigated_by")
 
@@ -72,7 +73,7 @@ def _table(data: bytes, file: str) -> tuple[Piece, tuple[Diagnostic, ...]]:
     except ValueError as error:
         raise Rejected(Diagnostic("PLAN109", f"not a CSV file: {error}", Span(file, 1, 1, 1, 2))) from None
     if not rows:
-        raise Rejected(Diagnostic("PLAN109", "the table is empty", Span(file, 1, 1, 1, 2)))
+        raise Rejected(Diagnostic("PLAN109", "the table is empty", Span(file, 1, 1, 1, 2), hint=_HEADINGS))
     (line, header), *entries = rows
     fields = {bare(word): field for field, words in COLUMNS.items() for word in words}
     at = {fields[bare(word)]: place for place, word in enumerate(header) if bare(word) in fields}

@@ -7,7 +7,7 @@ name. The plan has to agree: a topic that the two resolve differently is an erro
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -17,7 +17,7 @@ import yaml
 from avow.base.diagnostics import Diagnostic, Severity, Span
 from avow.base.files import inside, read_regular
 from avow.base.plain import count
-from avow.base.suggestions import nearby, nearest, suggest
+from avow.base.suggestions import did_you_mean, nearby, nearest, suggest
 from avow.base.workspace import find_workspace
 from avow.language.contract import Contract, Node
 from avow.ros.launch import Launched, Setting, Started, read_launch
@@ -49,16 +49,34 @@ def read_launched(plan: Path, pieces: Iterable[Piece]) -> tuple[Launched | None,
 def in_workspace(plan: Path, piece: Piece, faults: list[Diagnostic]) -> Path | None:
     """A file or a bag's folder that the plan names: it is in the workspace, or in the system's folder if that is in no
     workspace. Otherwise None, and a fault."""
-    folder, root = plan.resolve().parent, _root(plan)
-    path = inside(root, f"{folder.relative_to(root).as_posix()}/{piece.text}")
-    if path is None or Path(piece.text).is_absolute():
-        faults.append(Diagnostic("PLAN108", f"the path {piece.text[:200]!r} leads out of the workspace", piece.span))
-    elif path.is_file() or (path / BAG_FILE).is_file():
-        return path
-    else:
-        message = f"there is no file {piece.text!r} in {folder}"
-        faults.append(Diagnostic("PLAN107", message, piece.span, hint=nearby(path, piece.text)))
-    return None
+    return named_file(
+        piece,
+        plan.resolve().parent,
+        (_root(plan), "the workspace"),
+        faults,
+        lambda path: path.is_file() or (path / BAG_FILE).is_file(),
+    )
+
+
+def named_file(
+    piece: Piece,
+    folder: Path,
+    within: tuple[Path, str],
+    faults: list[Diagnostic],
+    is_there: Callable[[Path], bool] = Path.exists,
+) -> Path | None:
+    """A file that a plan in the folder names. None, and a fault, if it leads out of the place `within` (with its name
+    for the message), or is not there."""
+    (root, around), text = within, piece.text
+    path = None if Path(text).is_absolute() else inside(root, f"{folder.relative_to(root).as_posix()}/{text}")
+    if path is None:
+        hint = f"copy what it names into {root.name}: a clone has all that a plan reads"
+        faults.append(Diagnostic("PLAN108", f"the path {text[:200]!r} leads out of {around}", piece.span, hint=hint))
+    elif not is_there(path):
+        message = f"there is no file {text!r} in {folder}"
+        faults.append(Diagnostic("PLAN107", message, piece.span, hint=nearby(path, text)))
+        return None
+    return path
 
 
 def _root(plan: Path) -> Path:
@@ -231,7 +249,9 @@ def told(system: System) -> Iterator[Diagnostic]:
 
 
 def _runs(node: Node, placed: Placed) -> str:
-    remaps = ", ".join(f"{old} → {new}" for old, new in placed.remaps)
+    known = [placed.expanded(topic.name.partition("/_action/")[0]) for topic in node.topics]
+    others = {old: " (not in the contract)" for old, _ in placed.remaps if placed.expanded(old) not in known}
+    remaps = ", ".join(f"{old} → {new}{others.get(old, '')}" for old, new in placed.remaps)
     return f"{node.name} runs as {placed.name}" + (f", with {remaps}" if remaps else "")
 
 
@@ -298,7 +318,8 @@ def _disagreements(node: Node, mine: Placed, launched: Started) -> Iterator[Diag
                 f"by {where(launched.span)}"
             )
             notes = ((f"{launched.name} is started here", launched.span),)
-            yield Diagnostic("ROS122", message, mine.span, notes=notes)
+            near = did_you_mean(old, [topic.name for topic in node.topics])
+            yield Diagnostic("ROS122", message, mine.span, hint=near or "make both the same", notes=notes)
 
 
 def where(span: Span | None) -> str:

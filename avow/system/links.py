@@ -10,6 +10,7 @@ from dataclasses import replace
 from avow.base.files import sha256
 from avow.language.contract import Contract, Node
 from avow.language.printer import show_sort, show_term, show_type
+from avow.language.sorts import DataSort, EnumSort, components
 from avow.system.folding import leaves
 from avow.system.plan import Method, NodePlan, Plan, Requirement, System
 
@@ -74,9 +75,10 @@ def _promised(node: Node, name: str | None = None) -> Iterator[str]:
 def _placed(node: Node, plan: Plan) -> Iterator[str]:
     """A node's ports with their units and frames, and what is connected to its inputs."""
     for port in (*node.inputs, *node.outputs):
-        unit = (port.unit,) if port.unit else ()
+        listed = (show_type(part) for part in components(port.sort) if isinstance(part, EnumSort | DataSort))
+        more = (*((port.unit,) if port.unit else ()), *sorted(listed))
         yield repr(
-            (node.name, port.role.name, port.name + " (parameter)" * port.parameter, show_sort(port.sort), *unit)
+            (node.name, port.role.name, port.name + " (parameter)" * port.parameter, show_sort(port.sort), *more)
         )
     for topic in node.topics:
         frame = (topic.frame,) if topic.frame else ()

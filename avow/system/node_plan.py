@@ -20,8 +20,9 @@ from avow.base.suggestions import suggest
 from avow.language.contract import Node
 from avow.language.sorts import BoolSort, EnumSort, IntegerSort, NaturalSort, RealSort
 from avow.ros.parameters import WrongParameters, flat, is_sectioned, nested, placed
+from avow.system.pieces import Piece
 from avow.system.plan import Driving, Method, Numbers, Plan, Source
-from avow.system.strict_yaml import Piece, read_yaml
+from avow.system.strict_yaml import read_yaml
 
 # -- methods -----------------------------------------------------------------------------------------------------------
 
@@ -67,8 +68,7 @@ def _method(node: str, item: Piece, mapping: Piece | None, used: set[str], fault
         name = f"{backend}-{number}"
         number += 1
     used.add(name)
-    located = options.located()
-    located = replace(located, key_spans={**located.key_spans, (): item.key_span(backend)})
+    located = replace(options.located(), key_span=item.key_span(backend))
     return Method(name, backend, located, options.texts("guarantees"))
 
 

@@ -84,8 +84,8 @@ def _node(plan: Plan, node: Node, faults: list[Diagnostic]) -> tuple[Node, Mappi
     sources = tuple(_sources(plan, node)) if ports else ()
     entry = plan.node(node.name)
     known = [port.name for port in ports]
-    for name in entry.parameters.data if entry.source is None else ():
-        if name not in known:
+    for name in () if entry.source and entry.source.python else entry.parameters.data:
+        if name.replace(".", "_") not in known:
             message = f"nodes.{node.name}.parameters: {node.name} has no parameter {name!r}"
             hint = suggest(name, known) or f"declare it under the node's `inputs`: `parameter {name} : REAL`"
             faults.append(Diagnostic("PLAN106", message, entry.parameters.at(name), hint=hint))

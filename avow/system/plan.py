@@ -17,39 +17,14 @@ from avow.base import codec
 from avow.base.diagnostics import Span
 from avow.base.files import sha256
 from avow.base.records import dataclass
+from avow.base.remembered import by_identity
 from avow.language.contract import Contract, Port
 from avow.language.lints import uncarried, unspoken
 from avow.ros.launch import Launched
 from avow.ros.names import Resolver
 from avow.ros.quality import Quality
+from avow.system.pieces import Located as Located
 from avow.system.probability import Probability
-
-
-@dataclass(frozen=True, slots=True)
-class Located:
-    """A piece of YAML as plain data, with the place of every key and item in it.
-
-    `spans` maps a path, such as ``("predicates", "in.r")`` or ``("select", 0)``, to the position of its value.
-    """
-
-    data: Any
-    span: Span
-    spans: Mapping[tuple[str | int, ...], Span] = field(default_factory=dict, compare=False, repr=False)
-    key_spans: Mapping[tuple[str | int, ...], Span] = field(default_factory=dict, compare=False, repr=False)
-    """The same for the position of its key."""
-
-    def key(self, *path: str | int) -> Span:
-        """The place of a part's key; of its value, if it has none."""
-        return self.key_spans.get(path) or self.at(*path)
-
-    def at(self, *path: str | int) -> Span:
-        """The place of a part, or of the nearest enclosing part that has one."""
-        while path:
-            if path in self.spans:
-                return self.spans[path]
-            path = path[:-1]
-        return self.span
-
 
 NOWHERE = Located({}, Span("", 1, 1, 1, 1))
 """Values that the plan's author did not write."""
@@ -465,10 +440,13 @@ class Plan:
 
     def node(self, name: str) -> NodePlan:
         """The plan of a node; a node that the plan does not mention has no methods and criticality ``medium``."""
-        for node in self.nodes:
-            if node.node == name:
-                return node
-        return NodePlan(name, "medium", ())
+        return _by_name(self.nodes).get(name) or NodePlan(name, "medium", ())
+
+
+@by_identity(20_000)
+def _by_name(nodes: tuple[NodePlan, ...]) -> dict[str, NodePlan]:
+    """The first of a name is kept."""
+    return {node.node: node for node in reversed(nodes)}
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,19 +7,19 @@ It needs no contract, whose files the plan names: `avow.system.names` then check
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
 from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.base.files import inside, read_regular, sha256
 from avow.base.remembered import Shelf
-from avow.base.suggestions import nearby
 from avow.ros.names import Placed, Resolver
 from avow.ros.quality import BAG_FILE, quality, seconds
 from avow.system.hazards import read_hazards
-from avow.system.launched import in_workspace, read_launched
+from avow.system.launched import in_workspace, named_file, read_launched
 from avow.system.node_plan import files_of, read_methods, read_source
+from avow.system.pieces import Located, Piece
 from avow.system.plan import (
     NOWHERE,
     ComposeGoal,
@@ -27,7 +27,6 @@ from avow.system.plan import (
     Endpoint,
     EnvironmentInput,
     Finding,
-    Located,
     NodeEnds,
     NodePlan,
     Plan,
@@ -43,7 +42,7 @@ from avow.system.plan import (
 from avow.system.probability import Probability
 from avow.system.schema import check_shape, without_faults
 from avow.system.statements import read_statements, wrong_words
-from avow.system.strict_yaml import Piece, read_yaml
+from avow.system.strict_yaml import read_yaml
 from avow.system.tables import domain, interpretation, plain, read_csv, read_rows
 
 T = TypeVar("T")
@@ -83,7 +82,7 @@ def read_rest(
     plan = reader.plan()
     faults += tuple(reader.faults)
     places = {fault.span for fault in faults}
-    wrong = frozenset(at for at, span in root.located().spans.items() if at and span in places)
+    wrong = frozenset(at for at, piece in root.parts() if at and piece.span in places)
     return plan, rest, faults, dropped, wrong
 
 
@@ -121,7 +120,7 @@ class _PlanReader:
         located = {
             key: (self.root.at(key) or Piece(self.root.span, value=None)).located() for key in ("model", "policy")
         }
-        self.model_graph()
+        self.files(self.root.each("model", "graph"))
         scenario = self.scenario()
         launched = self.noted(read_launched(self.path, self.root.each("ros", "launch")))
         ends = tuple(self.ends())
@@ -129,14 +128,14 @@ class _PlanReader:
         looked_at = [
             path / BAG_FILE if path.is_dir() else path for path in (*records, *(f for e in ends for f in e.files))
         ]
-        hazard_files = [path for piece, path in self.paths("hazards") if self.present(piece, path)]
+        hazard_files = self.files(self.root.each("hazards"))
         return Plan(
             system=name,
             title=self.root.said("title") or name,
             path=self.path,
             contract_files=self.contract_files(),
             model=located["model"],
-            messages=tuple(path for piece, path in self.paths("messages") if self.present(piece, path)),
+            messages=self.files(self.root.each("messages")),
             connections=tuple(self.connections()),
             environment=tuple(self.environment()),
             scenario=scenario,
@@ -179,30 +178,17 @@ class _PlanReader:
         self.faults += faults
         return found
 
-    def resolve(self, piece: Piece) -> Path | None:
-        path = inside(self.path.parent, piece.text)
-        if path is None:
-            shown = piece.text if len(piece.text) <= 200 else piece.text[:197] + "…"
-            what = "leads out of the system's folder" if shown == piece.text else "is too long, or leads out of it"
-            self.fault("PLAN108", f"the path {shown!r} {what}", piece.span)
-        return path
+    def file(self, piece: Piece) -> Path | None:
+        """A file of the system's folder, if it is there."""
+        folder = self.path.parent
+        return named_file(piece, folder, (folder, "the system's folder"), self.faults)
 
-    def present(self, piece: Piece, path: Path) -> bool:
-        if path.exists():
-            return True
-        near = nearby(path, piece.text)
-        self.fault("PLAN107", f"there is no file {piece.text!r} in {self.path.parent}", piece.span, near)
-        return False
-
-    def paths(self, *keys: str) -> Iterator[tuple[Piece, Path]]:
-        for item in self.root.each(*keys):
-            path = self.resolve(item)
-            if path is not None:
-                yield item, path
+    def files(self, pieces: Iterable[Piece]) -> tuple[Path, ...]:
+        return tuple(path for path in map(self.file, pieces) if path is not None)
 
     def contract_files(self) -> tuple[Path, ...]:
         if self.root.at("contract") is not None:
-            return tuple(path for piece, path in self.paths("contract") if self.present(piece, path))
+            return self.files(self.root.each("contract"))
         found = tuple(sorted(self.path.resolve().parent.glob("*.rcl")))
         for path in found:
             if inside(self.path.parent, path.name) is None:
@@ -212,10 +198,6 @@ class _PlanReader:
         if not found:
             self.fault("PLAN107", f"no contract: there is no .rcl file in {self.path.parent}", self.root.span)
         return found
-
-    def model_graph(self) -> None:
-        for piece, path in self.paths("model", "graph"):
-            self.present(piece, path)
 
     def connections(self) -> Iterator[Edge]:
         for piece in self.root.each("connections"):
@@ -293,10 +275,8 @@ class _PlanReader:
         if piece.items is not None:
             return self.noted(read_rows(name, piece))
         source = piece.at("file") or piece
-        path = self.resolve(source)
-        if path is None or not self.present(source, path):
-            return None
-        return self.noted(read_csv(name, path, source.span))
+        path = self.file(source)
+        return None if path is None else self.noted(read_csv(name, path, source.span))
 
     def requirements(self) -> Iterator[Requirement]:
         for name, _, piece in self.root.keyed("requirements"):
@@ -368,9 +348,7 @@ class _PlanReader:
 
     def source(self, name: str, piece: Piece) -> Source | None:
         found = self.noted(read_source(name, piece))
-        for part in files_of(piece):
-            path = self.resolve(part)
-            _ = path is not None and self.present(part, path)
+        self.files(files_of(piece))
         return found
 
     def findings(self, key: str) -> Iterator[Finding]:

@@ -102,8 +102,9 @@ def account(system: System, dataflow: Graph) -> Account | None:
             findings.append(Diagnostic("PLAN127", message, at("dropped", name)))
     lost = [node for node in graph.nodes if node not in home and node not in gone]
     if lost:
-        message = f"the ROS graph's {', '.join(lost)} are neither dropped nor part of a node of the model"
-        findings.append(Diagnostic("PLAN127", message, at("graph"), Severity.WARNING))
+        message = f"on the ROS graph, and neither dropped nor part of a node of the model: {', '.join(lost)}"
+        hint = f"model: {{dropped: {{{lost[0]}: why}}}}, or {{compound: {{NODE: [{lost[0]}]}}}}"
+        findings.append(Diagnostic("PLAN127", message, at("graph"), Severity.WARNING, hint))
     made = set(home.values()) | set(external)
     for node in system.contract.nodes:
         if node.name not in made and not node.relay:
@@ -124,7 +125,8 @@ def _flows(graph: RosGraph, home: dict[str, str], dataflow: Graph, span: Span) -
             found.setdefault((one, other), {})[topic] = None
     for (one, other), topics in found.items():
         message = f"ROS sends {', '.join(topics)} from {one} to {other}; the contracts connect nothing there"
-        yield Diagnostic("PLAN127", message, span, Severity.NOTE)
+        hint = "give each a port that `matches(…)` it; `avow init --messages FOLDER` drafts those of your own types"
+        yield Diagnostic("PLAN127", message, span, Severity.NOTE, hint)
 
 
 # -- forms -------------------------------------------------------------------------------------------------------------

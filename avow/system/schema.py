@@ -15,8 +15,7 @@ from avow.base.remembered import Shelf
 from avow.base.suggestions import did_you_mean, nearest, suggest
 from avow.base.tools import package_version
 from avow.base.tuning.sizes import REPAIR_ROUNDS
-from avow.system.plan import Located
-from avow.system.strict_yaml import Piece
+from avow.system.pieces import Located, Piece
 
 
 def plan_schema() -> dict[str, Any]:
@@ -27,7 +26,7 @@ def plan_schema() -> dict[str, Any]:
 
 def check_shape(piece: Piece, shelf: Shelf | None = None) -> tuple[Diagnostic, ...]:
     """Every violation of the schema, in the order of the file. `shelf`: the cache of documents without violations."""
-    return _faults(piece, plan_schema(), "the plan", shelf)
+    return violations(piece.located(), plan_schema(), shelf=shelf)
 
 
 def without_faults(root: Piece) -> tuple[Piece | None, frozenset[str]]:
@@ -75,45 +74,25 @@ def _without(piece: Piece, path: tuple[str | int, ...], dropped: set[str]) -> Pi
 def violations(
     options: Located, schema: Mapping[str, Any], whole: str = "the plan", shelf: Shelf | None = None
 ) -> tuple[Diagnostic, ...]:
-    """Every violation, in a part of a plan, of a schema of its own, such as a backend's for its options. `whole` is the
-    name of that part; `shelf`: as for `check_shape`."""
-    return _faults(_piece(options, ()), schema, whole, shelf)
-
-
-def _faults(piece: Piece, schema: Mapping[str, Any], whole: str, shelf: Shelf | None) -> tuple[Diagnostic, ...]:
-    # the diagnostics of a value depend on its type, too, which JSON would not show
+    """Every violation of a schema in a plan or a part of one, such as a method's options. `whole` is the name of that
+    part; `shelf`: as for `check_shape`."""
     if shelf is None:
-        return _departures(piece, schema, whole)
-    told = (package_version("jsonschema"), json.dumps(schema, default=repr), repr(piece.data))
+        return _departures(options, schema, whole)
+    # the diagnostics of a value depend on its type, too, which JSON would not show
+    told = (package_version("jsonschema"), json.dumps(schema, default=repr), repr(options.data))
     digest = shelf.digest("shape", *told)
     if shelf.knows(digest):
         return ()
-    found = _departures(piece, schema, whole)
+    found = _departures(options, schema, whole)
     if not found:
         shelf.note(digest)
     return found
 
 
-def _departures(piece: Piece, schema: Mapping[str, Any], whole: str) -> tuple[Diagnostic, ...]:
-    found = [d for error in _validator()(schema).iter_errors(piece.data) for d in _explain(error, piece, whole)]
+def _departures(options: Located, schema: Mapping[str, Any], whole: str) -> tuple[Diagnostic, ...]:
+    found = [d for error in _validator()(schema).iter_errors(options.data) for d in _explain(error, options, whole)]
     # the faults of what YAML repeats (`*name`) have one place, and the validator uses sets
     return tuple(sorted(found, key=lambda d: (d.span.line, d.span.column, d.message) if d.span else (0, 0, d.message)))
-
-
-def _piece(options: Located, path: tuple[str | int, ...]) -> Piece:
-    """The options as the reader of YAML saw them."""
-    data = options.data
-    for step in path:
-        data = data[step]
-    span = options.at(*path)
-    match data:
-        case dict():
-            entries = {str(key): _piece(options, (*path, key)) for key in data}
-            return Piece(span, entries=entries, keys={key: options.key(*path, key) for key in entries})
-        case list():
-            return Piece(span, items=[_piece(options, (*path, place)) for place in range(len(data))])
-        case _:  # a scalar
-            return Piece(span, data)
 
 
 def _key_path(path: Iterable[str | int], whole: str = "the plan") -> str:
@@ -140,32 +119,31 @@ def _pattern(validator: Any, pattern: str, instance: Any, schema: Any) -> Iterat
         yield ValidationError(f"{instance!r} does not match {pattern!r}")
 
 
-def _explain(error: Any, root: Piece, whole: str, also: Iterable[Any] = ()) -> Iterator[Diagnostic]:
+def _explain(error: Any, options: Located, whole: str, also: Iterable[Any] = ()) -> Iterator[Diagnostic]:
     """`also`: the errors of other alternatives about the same value, which allow other words."""
     path: tuple[str | int, ...] = tuple(error.absolute_path)
-    piece = root.at(*path) or root
     where = _key_path(path, whole)
     about = error.schema.get("description") if isinstance(error.schema, dict) else None
     wanted = f" (expected: {about})" if about else ""
     given = _show(error.instance)
 
     def fault(text: str, code: str = "PLAN105", at: Span | None = None, hint: str | None = None) -> Diagnostic:
-        return Diagnostic(code, f"{where}: {text}", at or piece.span, hint=hint)
+        return Diagnostic(code, f"{where}: {text}", at or options.at(*path), hint=hint)
 
     if "propertyNames" in error.absolute_schema_path:
         name = str(error.instance)
-        yield fault(f"the key {name!r} cannot be used here{wanted}", "PLAN103", piece.key_span(name))
+        yield fault(f"the key {name!r} cannot be used here{wanted}", "PLAN103", options.key(*path, name))
         return
     match error.validator:
         case "additionalProperties":
             known = list(error.schema.get("properties", {}))
-            for key in (key for key in piece.entries or {} if key not in known):
-                empty = (piece.entries or {})[key].data is None and not did_you_mean(key, known)
+            for key in (key for key in error.instance if key not in known):
+                empty = error.instance[key] is None and not did_you_mean(key, known)
                 hint = f"a text with a comma needs quotes: “…, {key}”" if empty else suggest(key, known)
-                yield fault(f"unknown key {key!r}", "PLAN103", piece.key_span(key), hint)
+                yield fault(f"unknown key {key!r}", "PLAN103", options.key(*path, key), hint)
         case "required" | "dependentRequired":
             named = str(error.message).split("'")[1]
-            unknown = (key for key in piece.entries or {} if key not in error.schema.get("properties", {key}))
+            unknown = (key for key in error.instance if key not in error.schema.get("properties", {key}))
             if any(nearest(key, error.schema["properties"])[:1] == [named] for key in unknown):
                 return  # the fault is the misspelled key
             yield fault(f"the key {named!r} is missing", "PLAN104")
@@ -212,13 +190,13 @@ def _explain(error: Any, root: Piece, whole: str, also: Iterable[Any] = ()) -> I
             elif not fitting:
                 yield fault(f"{ways} is wanted, not {given}{wanted}")
             elif closed:
-                yield from _explain(closed[0], root, whole, closed[1:])
+                yield from _explain(closed[0], options, whole, closed[1:])
             elif several and all(e.validator == "required" and e.absolute_path == error.absolute_path for e in fitting):
                 ways = _alternatives({"required": e.validator_value} for e in fitting)
                 yield fault(f"{ways} is missing{wanted}", "PLAN104")
             else:
                 for inner in fitting:
-                    yield from _explain(inner, root, whole)
+                    yield from _explain(inner, options, whole)
         case "maxProperties":
             yield fault(f"exactly one key is wanted{wanted}")
         case _:  # in the validator's words

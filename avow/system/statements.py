@@ -49,12 +49,14 @@ def without_words(system: System) -> Iterator[Diagnostic]:
 
 
 def expired(system: System) -> Iterator[Diagnostic]:
-    """A warning for each assumption of this plan whose last day has passed."""
-    for statement in system.plan.statements:
-        if _own(statement, system.plan) and "" < statement.until < datetime.now().astimezone().date().isoformat():
-            text = f"{statement.keys} has expired: its last day was {statement.until}"
-            hint = "decide whether it still holds, and give a new day: until: …"
-            yield Diagnostic("PLAN138", text, statement.until_span, Severity.WARNING, hint)
+    """A warning for each assumption and each accepted finding of this plan whose last day has passed."""
+    dated = [(s.keys, "until", s.until, s.until_span) for s in system.plan.statements if _own(s, system.plan)]
+    dated += [(f"accepted {f.obligation}", "expires", f.expires or "", f.span) for f in system.plan.accepted]
+    for what, key, last, span in dated:
+        if "" < last < datetime.now().astimezone().date().isoformat():
+            text = f"{what} has expired: its last day was {last}"
+            hint = f"decide whether it still holds, and give a new day: {key}: …"
+            yield Diagnostic("PLAN138", text, span, Severity.WARNING, hint)
 
 
 def not_validated(system: System) -> Iterator[Diagnostic]:

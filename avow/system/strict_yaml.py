@@ -9,98 +9,19 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Sequence
-from dataclasses import field, replace
+from collections.abc import Sequence
 from typing import Any
 
 import yaml
 
 from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.base.plain import invisible
-from avow.base.records import dataclass
 from avow.base.tuning.sizes import PLAN_BYTES
-from avow.system.plan import Located
+from avow.system.pieces import Piece as Piece
 
 _INTEGER = re.compile(r"-?(0|[1-9][0-9]*)\Z")
 _DECIMAL = re.compile(r"-?(0|[1-9][0-9]*)(\.[0-9]+)?([eE][-+]?[0-9]{1,3})?\Z")
 _WORDS = {"": None, "~": None, "null": None, "true": True, "false": False}
-
-
-@dataclass(slots=True)
-class Piece:
-    """A scalar (`value`), a list (`items`) or a mapping (`entries`: key → piece), with its place.
-
-    `text` is a scalar exactly as written, for cells of tables, where ``2.30`` must not become another number.
-    """
-
-    span: Span
-    value: Any = None
-    text: str = ""
-    items: list[Piece] | None = None
-    entries: dict[str, Piece] | None = None
-    keys: dict[str, Span] = field(default_factory=dict)
-    quoted: bool = False
-
-    @property
-    def inner(self) -> Span:
-        """The place of a scalar's text, without quotation marks."""
-        start, end = self.span.column + self.quoted, self.span.end_column - self.quoted
-        return replace(self.span, column=start, end_column=end)
-
-    @property
-    def data(self) -> Any:
-        """Plain data."""
-        if self.entries is not None:
-            return {key: piece.data for key, piece in self.entries.items()}
-        if self.items is not None:
-            return [piece.data for piece in self.items]
-        return self.value
-
-    def located(self) -> Located:
-        """The same as plain data with a map of positions."""
-        return Located(self.data, self.span, dict(_places(self, ())), dict(_keys(self, ())))
-
-    def at(self, *path: str | int) -> Piece | None:
-        """The piece at a path, or None."""
-        piece: Piece | None = self
-        for step in path:
-            if piece is None:
-                return None
-            if isinstance(step, int):
-                items = piece.items
-                piece = items[step] if items is not None and 0 <= step < len(items) else None
-            else:
-                piece = piece.entries.get(step) if piece.entries is not None else None
-        return piece
-
-    def each(self, *path: str | int) -> list[Piece]:
-        """The pieces of the list at a path; a piece that is not a list counts as a list of one."""
-        piece = self.at(*path)
-        return [] if piece is None else [piece] if piece.items is None else piece.items
-
-    def texts(self, *path: str | int) -> tuple[str, ...]:
-        """The texts of `each`."""
-        return tuple(item.text for item in self.each(*path))
-
-    def said(self, *path: str | int) -> str | None:
-        """The text at a path; None if it is missing."""
-        piece = self.at(*path)
-        return None if piece is None else piece.text
-
-    def words(self) -> dict[str, str]:
-        """The texts of a mapping, with single blanks."""
-        return {key: " ".join(part.text.split()) for key, part in (self.entries or {}).items() if part.items is None}
-
-    def keyed(self, *path: str | int) -> Iterator[tuple[str, Span, Piece]]:
-        """Each key of the mapping at a path, with its position and its value."""
-        piece = self.at(*path)
-        if piece is not None and piece.entries is not None:
-            for name, inner in piece.entries.items():
-                yield name, piece.key_span(name), inner
-
-    def key_span(self, key: str) -> Span:
-        """The place of a key of this mapping."""
-        return self.keys.get(key, self.span)
 
 
 def read_yaml(data: bytes, file: str) -> tuple[Piece, tuple[Diagnostic, ...]]:
@@ -115,7 +36,7 @@ def read_yaml(data: bytes, file: str) -> tuple[Piece, tuple[Diagnostic, ...]]:
     except UnicodeDecodeError as error:
         before = data[: error.start].decode("utf-8", errors="replace")
         line, column = _position(before, len(before))
-        raise Rejected(_error("not UTF-8 text", file, line, column)) from None
+        raise Rejected(_error("not UTF-8 text: save the file as UTF-8", file, line, column)) from None
     try:
         builder = _Builder(file)
         return builder.build(text), tuple(builder.problems)
@@ -151,7 +72,7 @@ _PROBLEMS = (
     (
         r"mapping values are not allowed",
         "a `:` stands where no key can be",
-        "check the indentation of this line and of the line before, or put the text in quotes",
+        "check how this line and the line before are indented, and the space after each `:`; or put the text in quotes",
     ),
     (r"could not find expected ':'", "a key without its `:`", "write `key: value`"),
     (r"expected <block end>, but found '([\]}])'", "a `{0}` closes no bracket", "remove it, or open the bracket"),
@@ -168,7 +89,7 @@ _PROBLEMS = (
         "write the value here, or its anchor above",
     ),
     ("second occurrence", "this anchor is given twice", "give one of them another name"),
-    (r"unexpected end of stream|found document separator", "a quotation mark or a bracket is not closed", None),
+    (r"end of stream|document separator|<stream end>", "a quotation mark or a bracket is not closed", None),
     (
         r"unknown escape character '(.*)'",
         "`\\{0}` means nothing in double quotes",
@@ -280,23 +201,6 @@ class _Builder:
 
     def reject(self, node: yaml.Node, code: str, message: str) -> Rejected:
         return Rejected(Diagnostic(code, message, self.span(node)))
-
-
-def _places(piece: Piece, path: tuple[str | int, ...]) -> Iterator[tuple[tuple[str | int, ...], Span]]:
-    yield path, piece.span
-    if piece.entries is not None:
-        for key, child in piece.entries.items():
-            yield from _places(child, (*path, key))
-    for index, child in enumerate(piece.items or ()):
-        yield from _places(child, (*path, index))
-
-
-def _keys(piece: Piece, path: tuple[str | int, ...]) -> Iterator[tuple[tuple[str | int, ...], Span]]:
-    yield from (((*path, key), piece.key_span(key)) for key in piece.entries or ())
-    for key, child in (piece.entries or {}).items():
-        yield from _keys(child, (*path, key))
-    for index, child in enumerate(piece.items or ()):
-        yield from _keys(child, (*path, index))
 
 
 def _position(text: str, offset: int) -> tuple[int, int]:

@@ -8,18 +8,19 @@ listener's assumptions then have to follow from each publisher's contract.
 
 from __future__ import annotations
 
+import re
 from collections import Counter, defaultdict
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from avow.base.diagnostics import Diagnostic, Severity, Span
 from avow.base.records import dataclass
-from avow.base.suggestions import did_you_mean, nearest, suggest
+from avow.base.suggestions import did_you_mean, distance, nearest, suggest
 from avow.language.contract import Clause, ClauseKind, Contract, Node, Port, Topic
 from avow.language.sorts import BOOL, FunctionSort
 from avow.language.terms import Apply, Compare, Iff, Or, Quantified, Quantifier, Role, Term, Variable
 from avow.ros.calls import CALL_PARTS, part_topic
-from avow.ros.definitions import HEADER, Array, Definitions, Nested, canonical
+from avow.ros.definitions import HEADER, Array, Definitions, Nested, canonical, definition_file
 from avow.ros.names import Resolver
 from avow.ros.sources import definitions
 from avow.system.plan import Driving, Edge, Endpoint, Plan
@@ -130,7 +131,7 @@ def unknown_types(plan: Plan, contract: Contract) -> Iterator[Diagnostic]:
         if package not in packages:
             near[:0] = (f"{other}/{word}" for other in nearest(package, packages, alike=0.75))
             text = f"neither `messages` nor the distribution has the package {package}, of {kind}"
-        file = _definition(package, word)
+        file, _ = definition_file(kind)
         # a package is named once, and the parts of a call are in one file
         if file not in missing and (
             package in packages or ((plan.messages or kind in needed) and package not in missing)
@@ -145,13 +146,6 @@ def unknown_types(plan: Plan, contract: Contract) -> Iterator[Diagnostic]:
         missing |= ({package} - packages) | ({file} if "_" in word else set())
 
 
-def _definition(package: str, word: str) -> str:
-    """The file that would define a type: ``my_msgs/srv/SetMode.srv`` for a part of that service's calls."""
-    name, _, part = word.partition("_")
-    kind = "srv" if part in ("Request", "Response") else "action" if part else "msg"
-    return f"{package}/{kind}/{name}.{kind}"
-
-
 def _parts_of(known: Definitions, kinds: Collection[str]) -> Iterator[tuple[str, Span, str]]:
     """The types of the fields of some types that the plan's files define, at their lines; and the fields' names."""
     named = [known.messages[kind] for kind in kinds if kind in known.messages]
@@ -162,17 +156,26 @@ def _parts_of(known: Definitions, kinds: Collection[str]) -> Iterator[tuple[str,
                 yield wire.name, Span(message.source, each.line, 1, each.line, 2), each.name
 
 
+_DIGITS = re.compile(r"\d")
+"""Two cameras differ in these alone."""
+
+
 def turned(plan: Plan, contract: Contract) -> Iterator[Diagnostic]:
-    """Remappings of a topic that the node does not have to one that it has: probably written the wrong way round."""
+    """Remappings of a topic that the node does not have: to one that it has, probably written the wrong way round; in a
+    launch file, of what is one letter from a topic that it has, or to what is like one."""
     for node in contract.nodes:
         placed = plan.ros.names.placed(node.name)
         own = {placed.expanded(topic.name): topic.name for topic in node.topics}
+        taken = [placed.expanded(old) for old, _ in placed.remaps]
         for old, new in placed.remaps:
             meant = own.get(placed.expanded(new))
             if placed.launched:  # a contract drafted from a running system has the names that topics have then
-                near = nearest(placed.expanded(new), own) if meant is None and placed.expanded(old) not in own else []
-                if near:
-                    message = f"{node.name} is started with {old} remapped to {new}, and has no topic of either name"
+                bare, *others = (_DIGITS.sub("", name) for name in (placed.expanded(old), *own))
+                slips = [t for t, b in zip(own, others, strict=True) if distance(bare, b, 1) == 1 and t not in taken]
+                near = slips or (nearest(placed.expanded(new), own) if meant is None else [])
+                if near and placed.expanded(old) not in own:
+                    lacks = f"no topic {placed.expanded(old)}" if slips else "no topic of either name"
+                    message = f"{node.name} is started with {old} remapped to {new}, and has {lacks}"
                     hint = f"did you mean `{near[0]}`?"
                     yield Diagnostic("ROS116", message, placed.span, Severity.WARNING, hint)
                 continue
@@ -180,6 +183,17 @@ def turned(plan: Plan, contract: Contract) -> Iterator[Diagnostic]:
                 message = f"{node.name} is started with {old}:={new}, and has no topic {old}, but {meant}"
                 hint = f"a remapping says the node's own name first: {{{meant}: {old}}}"
                 yield Diagnostic("ROS116", message, placed.span, Severity.WARNING, hint)
+
+
+def several(plan: Plan, contract: Contract) -> Iterator[Diagnostic]:
+    """A note for each topic that several nodes publish, which may be a slip."""
+    found = ends(contract.nodes, plan.ros.names)
+    for topic, _ in plan.ros.shared:
+        who = {at.node: c.span for at, _ in found.published[topic] for c in found.outputs[at] if c.topic == topic}
+        notes = tuple((f"{name} publishes it here", span) for name, span in who.items())
+        message = f"{topic} has several publishers, and an input on it takes what any says: {', '.join(who)}"
+        hint = "if one is not meant, correct its topic, or remap it"
+        yield Diagnostic("ROS117", message, notes[-1][1], Severity.NOTE, hint, notes)
 
 
 def contradicted(connections: Sequence[Edge], found: Ends, relays: Collection[str]) -> Iterator[Diagnostic]:

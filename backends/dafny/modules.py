@@ -55,7 +55,7 @@ def _complete() -> None:
     wanted = {
         f"{row.dafny.removeprefix('Types.')}{kind}"
         for row in OPERATORS.values()
-        if row.level is Level.ATOM and row.dafny.startswith("Types.")
+        if row.level is Level.ATOM and isinstance(row.dafny, str) and row.dafny.startswith("Types.")
         for kind in (("Bool",) if row.typing.takes_formulas else ("Int", "Real"))
     }
     missing = wanted - set(_FUNCTIONS)

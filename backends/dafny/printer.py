@@ -156,7 +156,7 @@ class _Printer:
         texts = []
         for term in terms:
             texts.append((yield self.operand(term, scope)))
-        return f" {operator} ".join(texts), len(texts) == 1
+        return f" {OPERATORS[operator].dafny} ".join(texts), len(texts) == 1
 
     def term(self, term: t.Term, scope: tuple[t.Variable, ...]) -> Steps[_Text]:
         whole: _Text
@@ -220,7 +220,7 @@ class _Printer:
             case t.History(operator=operator):
                 raise NotExpressible(f"'{operator}', which speaks of other steps", term.span)
             case t.Compare(operator=operator, left=left, right=right):
-                whole = yield self.infix(OPERATORS[operator].dafny, (left, right), scope)
+                whole = yield self.infix(operator, (left, right), scope)
                 return whole
             case t.In(item=item, collection=collection):
                 whole = yield self.membership(item, collection, scope)
@@ -229,16 +229,16 @@ class _Printer:
                 inner = yield self.operand(body, scope)
                 return f"!{inner}", True
             case t.And(items=items):
-                whole = (yield self.infix(OPERATORS["and"].dafny, items, scope)) if items else ("true", True)
+                whole = (yield self.infix("and", items, scope)) if items else ("true", True)
                 return whole
             case t.Or(items=items):
-                whole = (yield self.infix(OPERATORS["or"].dafny, items, scope)) if items else ("false", True)
+                whole = (yield self.infix("or", items, scope)) if items else ("false", True)
                 return whole
             case t.Implies(left=left, right=right):
-                whole = yield self.infix(OPERATORS["->"].dafny, (left, right), scope)
+                whole = yield self.infix("->", (left, right), scope)
                 return whole
             case t.Iff(left=left, right=right):
-                whole = yield self.infix(OPERATORS["<=>"].dafny, (left, right), scope)
+                whole = yield self.infix("<=>", (left, right), scope)
                 return whole
             case t.Quantified():
                 whole = yield self.quantified(term, scope)
@@ -250,8 +250,10 @@ class _Printer:
         self, operator: Operator, term: t.Arithmetic | t.Operation, scope: tuple[t.Variable, ...]
     ) -> Steps[_Text]:
         whole: _Text
+        if isinstance(operator.dafny, Why):
+            raise NotExpressible(f"'{operator.name}': {operator.dafny.reason}", term.span)
         if not operator.dafny.startswith("Types."):
-            whole = yield self.infix(operator.dafny, term.children, scope)
+            whole = yield self.infix(operator.name, term.children, scope)
             return whole
         texts = []
         for argument in term.children:

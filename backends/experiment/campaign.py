@@ -24,6 +24,7 @@ from avow.base.files import write
 from avow.base.plain import listed
 from avow.base.records import dataclass
 from avow.base.verdict import Verdict
+from avow.base.workspace import find_workspace
 from avow.isolation.tracing import Trace, traces
 from avow.language.terms import TRUE
 from avow.ros.bags import digest_trace
@@ -136,14 +137,25 @@ def perform(job: Job, campaign: Campaign, run: Run, seconds: float) -> tuple[Row
 
 
 def _all_named(job: Job, events: Iterable[tuple[str, str]]) -> None:
-    """Raises Rejected if the simulator read a file of the system's folder whose change would make no run stale."""
-    root, known = job.root.resolve(), set(command_files(job))
-    read = {Path(os.path.realpath(path)) for event, path in events if event == "read"}
-    unnamed = [p.relative_to(root).as_posix() for p in sorted(read - known) if root in p.parents and p.is_file()]
-    if left := [name for name in unnamed if "__pycache__" not in name]:
+    """Raises Rejected if the simulator read a file of the workspace whose change would make no run stale."""
+    own, place = job.root.resolve(), find_workspace(job.root.resolve())
+    root = place.root.resolve() if place else own
+    read = {Path(os.path.realpath(path)) for event, path in events if event == "read"} - set(command_files(job))
+    unnamed = [
+        p for p in sorted(read) if root in p.parents and p.is_file() and not (own not in p.parents and _tool(p, root))
+    ]
+    if left := [os.path.relpath(p, own) for p in unnamed if "__pycache__" not in p.parts]:
         message = f"the simulator reads {listed(left)}, which the plan does not name"
         hint = f"add `files: [{', '.join(left)}]`, so that the runs no longer count when it changes"
+        if outside := [name for name in left if name.startswith("..")]:
+            hint = f"copy {listed(outside)} into the system's folder, and name its files under `files`"
         raise Rejected(Diagnostic("EXP107", message, job.method.options.at("campaign"), hint=hint))
+
+
+def _tool(path: Path, root: Path) -> bool:
+    """Whether a file below `root` belongs to a Python environment, or lies in a hidden folder."""
+    above = (path, *(folder for folder in path.parents if root in folder.parents))
+    return any(place.name.startswith(".") or (place / "pyvenv.cfg").is_file() for place in above)
 
 
 def remove(path: Path) -> None:

@@ -69,6 +69,8 @@ class Experiment:
     """The regressions of a campaign; None if there is no campaign."""
     alike: int = 0
     """The runs of a campaign whose recording equals that of an earlier one."""
+    computed: frozenset[str] = frozenset()
+    """The columns that a network adds: they change with it, and are no part of what was measured."""
 
     def values(self, rows: Iterable[Mapping[str, str]]) -> tuple[Step, ...]:
         """Raises Unfit, and KeyError if a cell is missing."""
@@ -170,6 +172,7 @@ class _Reader:
             tuple(str(name) for name in left_out.get("runs", ())),
             " ".join(left_out.get("because", "").split()),
             replayed,
+            computed=frozenset(self.options.get("network", {}).get("outputs", {})),
         )
 
     def _claimed(self) -> tuple[Fraction | None, Fraction]:

@@ -303,12 +303,14 @@ def _is_there(kept: Mapping[str, Any], experiment: Experiment) -> bool:
     seed and scenario."""
     own = experiment.replayed is not None
     runs = (*experiment.runs, *(experiment.replayed or ()))
-    return any((own or run.name == kept["run"]) and _same(kept.get("rows", ()), run.rows) for run in runs)
+    return any(
+        (own or run.name == kept["run"]) and _same(kept.get("rows", ()), run.rows, experiment.computed) for run in runs
+    )
 
 
-def _same(before: Sequence[Mapping[str, str]], now: Sequence[Mapping[str, str]]) -> bool:
+def _same(before: Sequence[Mapping[str, str]], now: Sequence[Mapping[str, str]], computed: frozenset[str]) -> bool:
     return len(before) == len(now) and all(
-        all(one[column] == other[column] for column in one.keys() & other.keys())
+        all(one[column] == other[column] for column in one.keys() & other.keys() - computed)
         for one, other in zip(before, now, strict=True)
     )
 

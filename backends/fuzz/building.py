@@ -182,12 +182,11 @@ def _first(done: Completed, reading: Reading, folder: Path) -> str:
         return "the compiler did not end in the time given"
     lines = [line for line in done.stderr.splitlines() if "error:" in line or "undefined reference" in line]
     text = (lines or done.stderr.strip().splitlines() or [f"the compiler ended with code {done.code}"])[0]
-    unnamed = re.search("(unknown type name|undeclared identifier) 'AvowNode'", text)
-    missing = f"{reading.adapter.name} defines no `struct AvowNode`: " if unnamed else ""
-    if re.match(rf"{re.escape(str(folder))}\S*|(harness|replay)\.cpp", text) and LINK not in text.partition(" ")[0]:
-        missing += (
-            f"{reading.adapter.name} has no `void step(const avow::Inputs&, avow::Outputs&)` that can be called: "
-        )
+    name, missing = reading.adapter.name, ""
+    if re.search("(unknown type name|undeclared identifier) 'AvowNode'", text):
+        missing = f"{name} defines no `struct AvowNode` (`cpp` names the adapter; other files go under `sources`): "
+    elif re.match(rf"{re.escape(str(folder))}\S*|(harness|replay)\.cpp", text) and LINK not in text.partition(" ")[0]:
+        missing = f"{name} has no `void step(const avow::Inputs&, avow::Outputs&)` that can be called: "
     absent = "; name the folder that holds it under `include`" if text.endswith("file not found") else ""
     return (missing + plainly(text, reading, folder))[:300] + absent
 

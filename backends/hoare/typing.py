@@ -168,6 +168,9 @@ class Expressions(Checker):
     ) -> t.Term | None:
         return self._lacks(tree, name)
 
+    def product_of_vectors(self, tree: rcl.Syntax, name: str, arguments: Sequence[rcl.TermSyntax]) -> t.Term | None:
+        return self._lacks(tree, name)
+
     def _lacks(self, tree: rcl.Syntax, name: str) -> t.Term | None:
         why = OPERATORS[name].program if name in OPERATORS else None
         self.error("HOARE200", f"a program has no `{name}`{f': {why.reason}' if isinstance(why, Why) else ''}", tree)

@@ -15,6 +15,7 @@ from avow.backend_kit.given import summarized
 from avow.backend_kit.protocol import Job, Limits, Report
 from avow.base.codec import document
 from avow.base.diagnostics import Diagnostic, Rejected
+from avow.base.percent import at_most
 from avow.base.plain import ALLOWS_MORE
 from avow.base.process import Completed, ToolMissing
 from avow.base.tuning.running import WALL
@@ -30,7 +31,8 @@ from avow.solving.replay import opaque_sorts
 from . import callbacks, export
 from .convention import ANY, EXACT
 from .exchange import QUESTION, Answer, Question, Tried
-from .judging import MEANING, failure_bound, shown_bound
+from .export import GeneratedTest
+from .judging import MEANING, failure_bound
 from .subject import subject
 from .tuning import CONFIDENCE, REJECTED_CASES
 
@@ -40,7 +42,7 @@ def problems(job: Job) -> tuple[Diagnostic, ...]:
         found = subject(job)
         if callbacks.wanted(job):
             return callbacks.problems(job)
-        export.files(job, found)
+        GeneratedTest(job, found).files()
     except Rejected as rejected:
         return rejected.diagnostics
     except RecursionError:
@@ -49,12 +51,7 @@ def problems(job: Job) -> tuple[Diagnostic, ...]:
 
 
 def files(job: Job) -> Mapping[str, str]:
-    if callbacks.wanted(job):
-        return {}
-    try:
-        return export.files(job, subject(job))
-    except (Rejected, RecursionError):
-        return {}
+    return {} if callbacks.wanted(job) or problems(job) else GeneratedTest(job, subject(job)).files()
 
 
 def settle(job: Job, folder: Path, limits: Limits) -> Report:
@@ -69,12 +66,7 @@ def settle(job: Job, folder: Path, limits: Limits) -> Report:
         return Report.alike(job, Verdict.ERROR, summarized(job, found), "hypothesis", version)
     if callbacks.wanted(job):
         return callbacks.settle(job, limits, version)
-    with tempfile.TemporaryDirectory(prefix="avow-") as scratch:
-        # the export is written afresh: a file changed in between would be tested instead of the contract
-        place = Path(scratch)
-        for name, text in files(job).items():
-            (place / name).write_text(text, encoding="utf-8")
-        done, answer = _run(job, place, limits)
+    done, answer = _run(GeneratedTest(job, subject(job)), limits)
     command = ("pytest", export.test_name(job))
     logs = {"hypothesis.log": done.stdout + done.stderr} if done and (done.stdout + done.stderr).strip() else {}
     if answer is None:
@@ -96,55 +88,53 @@ def settle(job: Job, folder: Path, limits: Limits) -> Report:
     return Report(outcomes, "hypothesis", version, command, logs, answer.observed, answer.isolation)
 
 
-def _question(job: Job) -> Question:
-    unit = subject(job)
-    guarantees = tuple(map(job.clause, job.obligations))
-    inputs = tuple(p for p in job.node.inputs if p.variable.qualified not in unit.left_out)
+def _question(test: GeneratedTest) -> Question:
+    job, unit = test.job, test.subject
+    fixed = export.constants(job, unit)
     return Question(
         test=export.test_name(job),
         root=job.root.resolve(),
-        path=unit.path.resolve(),
-        function=unit.function,
-        driven=unit.driven,
-        source=unit.source,
-        held=unit.held,
-        accepted=unit.accepted,
-        constants={p.name: evaluate(p.value, {}) for p in export.constants(job, unit) if p.value is not None},
+        subject=replace(unit, path=unit.path.resolve()),
+        constants={p.name: evaluate(p.value, {}) for p in fixed if p.value is not None},
         cases=export.cases(job),
-        length=export.run_length([c.formula for c in (*job.node.assumptions, *guarantees)]),
+        length=test.steps,
         numbers=export.numbers(job),
-        names=export.port_names(inputs),
-        inputs=inputs,
-        outputs=tuple(p for p in job.node.outputs if p.variable.qualified not in unit.left_out),
-        left_out=tuple(sorted(unit.left_out)),
+        names=test.names,
+        inputs=test.inputs,
+        outputs=test.outputs,
         assumptions=job.node.assumptions,
         begins=job.begins if unit.driven else (),
-        guarantees=guarantees,
-        untranslated=export.untranslated(job, unit),
+        guarantees=test.guarantees,
+        untranslated=test.untranslated(),
         kept=tuple(tuple(case if isinstance(case, list) else [case]) for cases in job.kept.values() for case in cases),
     )
 
 
-def _run(job: Job, place: Path, limits: Limits) -> tuple[Completed | None, Answer | None]:
+def _run(test: GeneratedTest, limits: Limits) -> tuple[Completed | None, Answer | None]:
     """The result of Avow's run of the generated test, if it completed."""
-    (place / QUESTION).write_bytes(pickle.dumps(_question(job)))
-    (place / "run.py").write_text("from avow.backends.hypothesis.running import main\n\nmain()\n", encoding="utf-8")
-    try:
-        return judge.ask(
-            Answer,
-            "run.py",
-            [str(max(1.0, limits.seconds * 0.8)), str(limits.seed)],
-            cwd=place,
-            seconds=limits.seconds * WALL,
-            megabytes=limits.megabytes,
-            env={
-                "HYPOTHESIS_STORAGE_DIRECTORY": str(place / ".hypothesis"),
-                "PYTHONDONTWRITEBYTECODE": "",  # or every run would compile the same modules
-                "PYTHONHASHSEED": "0",
-            },
-        )
-    except ToolMissing:
-        return None, None
+    with tempfile.TemporaryDirectory(prefix="avow-") as scratch:
+        # the export is written afresh: a file changed in between would be tested instead of the contract
+        place = Path(scratch)
+        for name, text in test.files().items():
+            (place / name).write_text(text, encoding="utf-8")
+        (place / QUESTION).write_bytes(pickle.dumps(_question(test)))
+        (place / "run.py").write_text("from avow.backends.hypothesis.running import main\n\nmain()\n", encoding="utf-8")
+        try:
+            return judge.ask(
+                Answer,
+                "run.py",
+                [str(max(1.0, limits.seconds * 0.8)), str(limits.seed)],
+                cwd=place,
+                seconds=limits.seconds * WALL,
+                megabytes=limits.megabytes,
+                env={
+                    "HYPOTHESIS_STORAGE_DIRECTORY": str(place / ".hypothesis"),
+                    "PYTHONDONTWRITEBYTECODE": "",  # or every run would compile the same modules
+                    "PYTHONHASHSEED": "0",
+                },
+            )
+        except ToolMissing:
+            return None, None
 
 
 def _silence(done: Completed | None, limits: Limits) -> str:
@@ -210,7 +200,7 @@ def _tested(outcome: Outcome, answer: Answer, own: Tried, wanted: int, seed: int
     replayed = f", {answer.replayed} that once refuted a guarantee of this node" if answer.replayed else ""
     if answer.replayed:
         bound["replayed"] = answer.replayed
-    chance = f"95 %: below {shown_bound(least)} of such {'cases' if answer.runs is None else 'runs'} fail"
+    chance = f"95 %: at most {at_most(failure_bound(least))} of such {'cases' if answer.runs is None else 'runs'} fail"
     cases = f"{answer.valid} drawn cases"
     if answer.runs is not None:
         bound["runs"] = counted
@@ -238,9 +228,9 @@ def _doubt(answer: Answer, own: Tried, wanted: int) -> str:
     valid, rejected = answer.valid, answer.rejected
     if valid == 0 or answer.stopped == "assumptions" or (valid < wanted and rejected > REJECTED_CASES * valid):
         return f"the assumptions are met too rarely: {valid} of {valid + rejected} generated inputs"
-    if answer.stopped == "time":
+    if answer.stopped == "time" and valid < wanted:
         return f"only {valid} of {wanted} cases in the time given"
-    if answer.stopped == "again":
+    if answer.stopped in ("time", "again"):
         return "the time ended before the subject was asked again whether another process answers the same"
     if own.undecided:
         return f"{own.undecided} of {valid} cases could not be judged"

@@ -23,6 +23,7 @@ from avow.backend_kit.protocol import Backend, Job, JudgedRun, Limits, Report
 from avow.backend_kit.registry import judge_of_runs
 from avow.base.codec import document
 from avow.base.diagnostics import Diagnostic, Rejected
+from avow.base.percent import at_most
 from avow.base.process import Stopwatch
 from avow.base.verdict import Counterexample, Isolation, Object, Outcome, Verdict
 from avow.evidence.obligation import Obligation
@@ -38,7 +39,7 @@ from avow.system.topics import whole_name
 from . import tuning
 from .convention import ANY, EXACT, SPECIAL
 from .export import cases, numbers
-from .judging import MEANING, failure_bound, shown_bound
+from .judging import MEANING, failure_bound
 
 UNSTEADY = "undeclared input: asked the same again from its start, another process publishes otherwise"
 
@@ -382,7 +383,7 @@ class _Work:
         before += f", {self.unanswered} messages without an answer ({part:.0%})" if self.unanswered else ""
         summary = (
             f"{self.runs} drawn runs of {self.messages} messages{before}: held at {count.held} judgements, none breaks "
-            f"it (seed {self.limits.seed}; 95 %: below {shown_bound(triggered)} of such runs fail)"
+            f"it (seed {self.limits.seed}; 95 %: at most {at_most(failure_bound(triggered))} of such runs fail)"
         )
         details["meaning"] = MEANING
         return replace(outcome, verdict=Verdict.TESTED, summary=summary, bound=bound)

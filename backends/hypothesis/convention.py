@@ -10,9 +10,10 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Mapping, Sequence
 from fractions import Fraction
-from typing import Any, assert_never
+from typing import Any
 
 from avow.formulas.values import Data, Element, FunctionValue, Opaque, SequenceValue, Value, show
+from avow.isolation.host import coded, plain
 from avow.language import sorts
 from avow.language.printer import show_sort
 
@@ -243,47 +244,16 @@ SPECIAL = {"-0": "-0x0.0p+0", "NaN": "nan", "infinity": "inf", "-infinity": "-in
 
 
 def as_value(given: Any, sort: sorts.Sort) -> Value:
-    """The contract's value for a drawn one. Raises ValueError or OverflowError if a float is not a number."""
-    match sort:
-        case sorts.BoolSort() | sorts.StringSort() | sorts.IntegerSort() | sorts.NaturalSort():
-            return given  # type: ignore[no-any-return]
-        case sorts.RealSort():
-            return Fraction(given)
-        case sorts.EnumSort():
-            return Element(given)
-        case sorts.OpaqueSort(name=name):
-            return Opaque(name, int(given.removeprefix(f"{name}#")))
-        case sorts.DataSort():
-            constructor, *arguments = given
-            parameters = sort.constructor(constructor).parameters
-            return Data(constructor, tuple(map(as_value, arguments, parameters)))
-        case sorts.TupleSort(items=items):
-            return tuple(map(as_value, given, items))
-        case sorts.SequenceSort(item=item):
-            return SequenceValue(tuple(as_value(one, item) for one in given))
-        case sorts.FunctionSort(parameters=parameters, result=result):
-            default = as_value(given.default, result)
-            rows = {tuple(map(as_value, point, parameters)): as_value(v, result) for point, v in given.table.items()}
-            return FunctionValue({point: value for point, value in rows.items() if value != default}, default)
-        case sorts.SetSort():
-            raise ValueError("a set is no input")
-        case _:
-            assert_never(sort)
+    """The contract's value for a drawn one. Raises Malformed if it is not of the sort, as NaN is not."""
+    if not isinstance(sort, sorts.FunctionSort):
+        return received(coded(given), sort, "a drawn value")
+    rows = [[[coded(part) for part in point], coded(value)] for point, value in given.table.items()]
+    return received({"f": rows, "e": coded(given.default)}, sort, "a drawn function")
 
 
 def as_plain(value: Value, table: Any) -> Any:
     """A value as the generated test has it; `table` is its class of functions."""
-    match value:
-        case Element(name=name):
-            return name
-        case Opaque():
-            return str(value)
-        case Data(constructor=constructor, arguments=arguments):
-            return (constructor, *(as_plain(one, table) for one in arguments))
-        case SequenceValue(items=items) | (tuple() as items):
-            return tuple(as_plain(item, table) for item in items)
-        case FunctionValue(table=rows, default=default):
-            points = {tuple(as_plain(p, table) for p in point): as_plain(v, table) for point, v in rows.items()}
-            return table(points, as_plain(default, table))
-        case _:  # a number, a truth value, a text
-            return value
+    if not isinstance(value, FunctionValue):
+        return plain(sent(value, doubles=False))
+    rows = {tuple(as_plain(p, table) for p in point): as_plain(v, table) for point, v in value.table.items()}
+    return table(rows, as_plain(value.default, table))

@@ -12,6 +12,8 @@ from avow.formulas.values import Value
 from avow.isolation.observed import Observed
 from avow.language.contract import Clause, Port
 
+from .subject import SubjectFile
+
 QUESTION = "question.pickle"
 
 Pairs = tuple[tuple[str, str], ...]
@@ -25,14 +27,7 @@ class Question:
     test: str
     """The file's name."""
     root: Path
-    path: Path
-    function: str
-    """For a driven class, how to drive it, as JSON (`avow.drive.steps`)."""
-    driven: bool
-    source: bool
-    """The unit under test is the node's own class."""
-    held: Mapping[str, str]
-    accepted: frozenset[str] | None
+    subject: SubjectFile
     constants: Mapping[str, Value]
     """The values of parameters that it takes as arguments."""
     cases: int
@@ -43,7 +38,6 @@ class Question:
     """Input port → its name in the generated test."""
     inputs: tuple[Port, ...]
     outputs: tuple[Port, ...]
-    left_out: tuple[str, ...]
     assumptions: tuple[Clause, ...]
     begins: tuple[Clause, ...]
     guarantees: tuple[Clause, ...]

@@ -7,10 +7,8 @@ import json
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
 from importlib.resources import files as files_of
 from pathlib import PurePosixPath
-from typing import Any
 
 from avow.backend_kit.programs.samples import leaves
 from avow.backend_kit.protocol import Job
@@ -55,8 +53,7 @@ _RESERVED = frozenset(dir(builtins)).union(
 
 def cases(job: Job) -> int:
     """The number of cases in the plan."""
-    wanted = job.options.get("cases", 500)
-    return wanted if isinstance(wanted, int) and not isinstance(wanted, bool) and wanted > 0 else 500
+    return int(job.options.get("cases", 500))
 
 
 def numbers(job: Job) -> str:
@@ -71,28 +68,7 @@ def test_name(job: Job) -> str:
     return f"test_{as_identifier(job.node.name)}.py"
 
 
-def run_length(formulas: Sequence[Term]) -> int:
-    """Steps of a run: enough for the contract's time limits to expire."""
-    return tuning.STEPS + min(2 * longest_limits(formulas), tuning.LONGEST_RUN)
-
-
-def files(job: Job, subject: SubjectFile) -> Mapping[str, str]:
-    """Relative path → text. Pure, except that it reads the unit under test. Raises RecursionError."""
-    test = _Test.of(job, subject)
-    found = {test_name(job): test.text()}
-    if test.strategies.tables:
-        rows = {name: rows for name, (_, rows) in test.strategies.tables.items()}
-        found[SCENARIO] = json.dumps(rows) + "\n"
-    return found
-
-
-def untranslated(job: Job, subject: SubjectFile) -> frozenset[str]:
-    """The guarantees that the generated test leaves to Avow."""
-    test = _Test.of(job, subject)
-    return frozenset(c.name for c in test.guarantees if isinstance(test.said(c), Untranslatable))
-
-
-def port_names(ports: Sequence[Port]) -> dict[str, str]:
+def _port_names(ports: Sequence[Port]) -> dict[str, str]:
     """The Python name of each port."""
     found: dict[str, str] = {}
     for port in ports:
@@ -105,70 +81,68 @@ def constants(job: Job, subject: SubjectFile) -> tuple[Port, ...]:
     return () if subject.source else tuple(p for p in job.node.fixed if subject.takes(p.name))
 
 
-@dataclass(slots=True)
-class _Test:
-    job: Job
-    subject: SubjectFile
-    inputs: tuple[Port, ...]
-    outputs: tuple[Port, ...]
-    guarantees: tuple[Clause, ...]
-    strategies: Strategies
-    doubles: bool
-    runs: bool
-    """Whether it is tested over runs."""
-    names: dict[str, str]
-    """Input port → its Python name."""
-    before: Translator
-    """For formulas before the unit is called; it has no names for the state after this step."""
-    after: Translator
-    formulas: dict[str, Term]
-    """By the clause's name, over one step and the remembered values."""
-    kept: list[tuple[str, str, str]]
-    """The contract's state variables: name, first value, value after a step."""
-    limits: Mapping[str, Any] = field(default_factory=dict)
+class GeneratedTest:
+    """The test of a unit against the guarantees of a job."""
 
-    @classmethod
-    def of(cls, job: Job, subject: SubjectFile) -> _Test:
+    def __init__(self, job: Job, subject: SubjectFile) -> None:
+        """Reads the unit under test. Raises RecursionError."""
+        self.job, self.subject = job, subject
         node, left = job.node, subject.left_out
-        inputs = tuple(p for p in node.inputs if p.variable.qualified not in left)
-        outputs = tuple(p for p in node.outputs if p.variable.qualified not in left)
-        guarantees = tuple(job.clause(o) for o in job.obligations)
-        clauses = (*node.assumptions, *guarantees)
-        doubles = numbers(job) != EXACT
-        known = thresholds((c.formula for c in clauses), modules(subject.path), leaves(dict(subject.parameters)))
-        tables = {} if subject.driven else {p.name: t for p in inputs if (t := _table(job, p)) is not None}
-        names = port_names(inputs)
+        self.inputs = tuple(p for p in node.inputs if p.variable.qualified not in left)
+        self.outputs = tuple(p for p in node.outputs if p.variable.qualified not in left)
+        self.guarantees = tuple(job.clause(o) for o in job.obligations)
+        clauses = (*node.assumptions, *self.guarantees)
+        self.limit = longest_limits(c.formula for c in clauses)
+        """The largest number of steps of the limits of one clause."""
+        self.doubles = numbers(job) != EXACT
+        self.runs = subject.driven or remembers(node)
+        """Whether it is tested over runs."""
+        self.limits = bounds(c.formula for c in node.assumptions)
+        self.names = _port_names(self.inputs)
+        """Input port → its Python name."""
+        # by the clause's name, over one step and the remembered values
         records = Records()
-        formulas = {c.name: records.clause(c.formula) if histories(c.formula) else c.formula for c in clauses}
-        taken = {f"in.{port}": name for port, name in names.items()}
-        taken |= {f"out.{p.name}": f"out.{safe_name(p.name)}" for p in outputs}
-        reserved = _RESERVED | {*names.values(), PurePosixPath(subject.name).stem}
-        before = Translator(taken, reserved)
-        kept: list[tuple[str, str, str]] = []
+        self.formulas = {c.name: records.clause(c.formula) if histories(c.formula) else c.formula for c in clauses}
+        known = thresholds((c.formula for c in clauses), modules(subject.path), leaves(dict(subject.parameters)))
+        tables = {} if subject.driven else {p.name: t for p in self.inputs if (t := _table(job, p)) is not None}
+        meeting = any(isinstance(p.sort, sorts.FunctionSort) for p in self.inputs)
+        self.strategies = Strategies(known, self.doubles, subject.driven, meeting, tables)
+        taken = {f"in.{port}": name for port, name in self.names.items()}
+        taken |= {f"out.{p.name}": f"out.{safe_name(p.name)}" for p in self.outputs}
+        reserved = _RESERVED | {*self.names.values(), PurePosixPath(subject.name).stem}
+        self.before = Translator(taken, reserved)
+        """For formulas before the unit is called; it has no names for the state after this step."""
         named: dict[Term, str] = {}
-        after = Translator(taken, reserved, named)
+        self.after = Translator(taken, reserved, named)
+        self.kept: list[tuple[str, str, str]] = []
+        """The contract's state variables: name, first value, value after a step."""
         for number, cell in enumerate(c for c in records.cells if not c.parameters):
             name = f"{cell.record.operator if cell.record is not None else 'first'}_{number + 1}"
             try:
-                first = before.formula(cell.initial) if cell.initial is not None else "None"
+                first = self.before.formula(cell.initial) if cell.initial is not None else "None"
                 taken[cell.before.qualified] = f"self.{name}"
-                kept.append((name, first, after.formula(cell.now)))
+                self.kept.append((name, first, self.after.formula(cell.now)))
                 if cell.now.children:
                     named[cell.now] = name
             except Untranslatable:
                 taken.pop(cell.before.qualified, None)
-        meeting = any(isinstance(p.sort, sorts.FunctionSort) for p in inputs)
-        strategies = Strategies(known, doubles, subject.driven, meeting, tables)
-        runs, limits = subject.driven or remembers(node), bounds(c.formula for c in node.assumptions)
-        return cls(
-            job, subject, inputs, outputs, guarantees, strategies, doubles, runs, names,
-            before, after, formulas, kept, limits,
-        )  # fmt: skip
 
     @property
-    def limit(self) -> int:
-        """The largest number of steps of the limits of one clause."""
-        return longest_limits(c.formula for c in (*self.job.node.assumptions, *self.guarantees))
+    def steps(self) -> int:
+        """Steps of a run: enough for the contract's time limits to expire."""
+        return tuning.STEPS + min(2 * self.limit, tuning.LONGEST_RUN)
+
+    def files(self) -> Mapping[str, str]:
+        """Relative path → text."""
+        found = {test_name(self.job): self.text()}
+        if self.strategies.tables:
+            rows = {name: rows for name, (_, rows) in self.strategies.tables.items()}
+            found[SCENARIO] = json.dumps(rows) + "\n"
+        return found
+
+    def untranslated(self) -> frozenset[str]:
+        """The guarantees that it leaves to Avow."""
+        return frozenset(c.name for c in self.guarantees if isinstance(self.said(c), Untranslatable))
 
     def said(self, clause: Clause) -> str | Untranslatable:
         """The clause in Python."""
@@ -269,11 +243,10 @@ class _Test:
         yield from (f"    {line}" if line else line for text in lines for line in text.split("\n"))
         yield ""
         yield from (f"        self.{name} = {name}" for name, *_ in self.kept)
-        steps = tuning.STEPS + min(2 * self.limit, tuning.LONGEST_RUN)
-        runs = math.ceil(cases(self.job) / steps)
+        runs = math.ceil(cases(self.job) / self.steps)
         case = f"Test{as_identifier(self.job.node.name[:1].upper() + self.job.node.name[1:])}"
         yield from ("", "", f"{case} = {MACHINE}.TestCase")
-        yield f"{case}.settings = settings(max_examples={runs}, stateful_step_count={steps}, deadline=None)"
+        yield f"{case}.settings = settings(max_examples={runs}, stateful_step_count={self.steps}, deadline=None)"
 
     def _drawn(self, port: Port) -> str:
         limits = self.limits.get(port.name, (None, None)) if port.name not in self.subject.memory else (None, None)

@@ -17,10 +17,14 @@ if TYPE_CHECKING:
 
 def loaded(bench: Bench) -> ModuleType:
     """The generated test, whose import finds the stand-in."""
-    stem = bench.asked.path.stem
+    stem = bench.asked.subject.path.stem
     stand_in = ModuleType(stem)
-    made = _stand_in(bench) if bench.asked.driven else lambda **_: bench.outputs_here(bench.ask_here())
-    called = json.loads(bench.asked.function)["class"] if bench.asked.driven else bench.asked.function
+    made = _stand_in(bench) if bench.asked.subject.driven else lambda **_: bench.outputs_here(bench.ask_here())
+    called = (
+        json.loads(bench.asked.subject.function)["class"]
+        if bench.asked.subject.driven
+        else bench.asked.subject.function
+    )
     setattr(stand_in, called, made)
     spec = importlib.util.spec_from_file_location("generated", Path(bench.asked.test).resolve())
     assert spec is not None
@@ -47,7 +51,7 @@ def _stand_in(bench: Bench) -> type:
             return bench.outputs_here(bench.ask_here())
 
         def __getattr__(self, attribute: str) -> Any:
-            ports = [port for port, held in bench.asked.held.items() if held == attribute]
+            ports = [port for port, held in bench.asked.subject.held.items() if held == attribute]
             known = bench.found or bench.memory
             values = [known[port] for port in ports if port in known]
             if not values:
@@ -62,7 +66,7 @@ def observed(machine: Any, bench: Bench) -> Any:
 
     class Observed(machine):  # type: ignore[misc]
         def __init__(self) -> None:
-            if not bench.asked.driven:
+            if not bench.asked.subject.driven:
                 bench.begin()
             super().__init__()
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from decimal import ROUND_CEILING, Context
 
 from avow.backend_kit.programs.judging import Formula
 from avow.formulas.conditions import Condition, conditions
@@ -85,8 +84,3 @@ MEANING = (
     "the bound; it is no probability about the robot's own inputs"
 )
 """The condition of a bound, for the details of a record."""
-
-
-def shown_bound(cases: int) -> str:
-    """The same with two digits, rounded up."""
-    return f"{Context(prec=2, rounding=ROUND_CEILING).create_decimal(repr(failure_bound(cases))):g}"

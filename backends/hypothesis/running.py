@@ -164,7 +164,7 @@ class Bench:
         self.trace, self._over = [], False
         self.keeper.restart()
         self._hits = {name: list(g.hits) for name, g in self.guarantees.items()}
-        if self.asked.driven:
+        if self.asked.subject.driven:
             try:
                 self.memory = self.unit.begin()
             except SubjectFailed as error:
@@ -292,11 +292,12 @@ class Bench:
         if self.differs and not fault:
             fault = f"the generated test and Avow judge a case differently, which is a fault of Avow ({self.differs})"
         trace = tuple(pairs(*step) for step in self.crash_trace)
+        unit = self.asked.subject
         return Answer(
-            self.valid, self.replayed, self.rejected, self.undecided, stopped, self.asked.left_out,
+            self.valid, self.replayed, self.rejected, self.undecided, stopped, tuple(sorted(unit.left_out)),
             self.unit.process.observed(), self.unit.process.isolation, tuple(apart),
             pairs(self.unsteady, {}) if self.unsteady is not None else None, self.silent or self.unit.process.silent,
-            (trace[-1] if trace else (), self.crash) if self.crash else None, trace if self.asked.source else None,
+            (trace[-1] if trace else (), self.crash) if self.crash else None, trace if unit.source else None,
             self.runs if self.runs_counted else None, {name: self._tried(name) for name in self.guarantees}, fault,
         )  # fmt: skip
 
@@ -393,7 +394,9 @@ class Bench:
         often, one that violates a guarantee: answers that depend on clock, chance, memory addresses or the number of
         calls are not a function of the recorded inputs."""
         requests = self.unit.requests
-        short = [] if self.asked.driven else sorted(requests, key=lambda request: len(str(request)))[: BATCH // 2]
+        short = (
+            [] if self.asked.subject.driven else sorted(requests, key=lambda request: len(str(request)))[: BATCH // 2]
+        )
         twice = [request for request in short for _ in range(2)]
         with self._twin() as twin:
             for before in _batches(requests):
@@ -420,7 +423,7 @@ class Bench:
     def _asked_apart(self) -> list[tuple[Pairs, str]]:
         """Each REAL input in turn is NaN, infinite or the negative zero, with a few cases' other inputs."""
         found: dict[str, tuple[Pairs, str]] = {}
-        reals = [n for n, s in self.inputs.items() if n not in self.asked.held and isinstance(s, RealSort)]
+        reals = [n for n, s in self.inputs.items() if n not in self.asked.subject.held and isinstance(s, RealSort)]
         with self._twin():
             for inputs in self._starts:
                 for name, (word, text) in itertools.product(reals, SPECIAL.items()):
@@ -451,7 +454,7 @@ class Bench:
         trace = self.traces.get(name)
         if trace is None:
             return found
-        if self.asked.driven:
+        if self.asked.subject.driven:
             case: Any = [self.unit.step_of(inputs) for inputs, _ in trace]
         else:
             steps = [{n: sent(v, doubles=False) for n, v in inputs.items()} for inputs, _ in trace]

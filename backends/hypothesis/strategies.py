@@ -11,6 +11,7 @@ from fractions import Fraction
 from typing import assert_never
 
 from avow.base.plain import decimal
+from avow.formulas.finite import cell_value
 from avow.language import sorts
 from avow.language.bounds import constant
 from avow.language.terms import And, Compare, Role, Term, Variable, Widen
@@ -225,20 +226,11 @@ def readable(rows: Rows, columns: Sequence[sorts.Sort]) -> Rows:
 
 
 def _is_cell(text: str, sort: sorts.Sort) -> bool:
-    match sort:
-        case sorts.RealSort() | sorts.IntegerSort() | sorts.NaturalSort():
-            try:
-                number = Fraction(text)
-            except (ValueError, ZeroDivisionError):
-                return False
-            whole = number.denominator == 1 and (number >= 0 or isinstance(sort, sorts.IntegerSort))
-            return isinstance(sort, sorts.RealSort) or whole
-        case sorts.BoolSort():
-            return text.upper() in ("TRUE", "FALSE")
-        case sorts.EnumSort(members=members):
-            return text in members
-        case _:  # a text, or a sort without cells
-            return isinstance(sort, sorts.StringSort)
+    try:
+        cell_value(text, sort)
+    except ValueError:
+        return False
+    return True
 
 
 def _shown(value: Fraction | float) -> str:

@@ -113,19 +113,25 @@ def _step_class(found: SubjectFile, definition: ast.ClassDef, step: ast.Function
     if begun is not None and len(begun.args.args) - len(begun.args.defaults) > 1:
         message = f"`{definition.name}` is made without arguments"
         problems.append(Diagnostic("HYPO104", message, _span(begun, str(found.path))))
-    taken = {a.arg for a in (*step.args.args, *step.args.kwonlyargs)}
+    accepted = _accepted(step.args)
     for port in (*job.node.inputs, *job.node.fixed):
-        if port.name not in taken and step.args.kwarg is None:
+        if accepted is not None and port.name not in accepted:
             message = f"`step` does not take the input `{port.name}`"
             problems.append(Diagnostic("HYPO104", message, _span(step, str(found.path))))
-    wrong = _unfit({p.name: p.sort for p in (*job.node.inputs, *job.node.outputs)})
-    if wrong:
+    unfit = [port.name for port in (*job.node.inputs, *job.node.outputs) if not _plain(port.sort)]
+    if unfit:
         place = job.method.options.at("subject")
-        problems.append(Diagnostic("HYPO106", f"a step class is not given what {wrong} is", place))
+        problems.append(Diagnostic("HYPO106", f"a step class is not given what {unfit[0]} is", place))
     if problems:
         raise Rejected(*problems)
-    spec = {"class": definition.name, "params": coded({}), "memory": {}, "attributes": []}
-    return SubjectFile(found.name, found.path, json.dumps(spec), driven=True, class_name=definition.name)
+    function = _driving(definition.name, {}, {})
+    return SubjectFile(found.name, found.path, function, driven=True, class_name=definition.name)
+
+
+def _driving(class_name: str, parameters: Mapping[str, Any], memory: Mapping[str, str]) -> str:
+    """How to drive a class, as JSON (`avow.drive.steps`)."""
+    spec = {"class": class_name, "params": coded(dict(parameters)), "memory": dict(memory), "attributes": []}
+    return json.dumps(spec)
 
 
 def _without(found: SubjectFile, step: ast.FunctionDef | None, job: Job) -> SubjectFile:
@@ -133,13 +139,12 @@ def _without(found: SubjectFile, step: ast.FunctionDef | None, job: Job) -> Subj
     `step` does not take it. Raises Rejected."""
     clauses = (*job.node.assumptions, *map(job.clause, job.obligations))
     spoken = {v.qualified for clause in clauses for v in free_variables(clause.formula)}
-    taken = {a.arg for a in (*step.args.args, *step.args.kwonlyargs)} if step is not None else set()
-    every = step is None or step.args.kwarg is not None
+    accepted = _accepted(step.args) if step is not None else None
     left: set[str] = set()
     for port in (*job.node.inputs, *job.node.outputs):
         called = port.variable.qualified
-        needed = port in job.node.inputs and (every or port.name in taken)
-        if not _unfit({port.name: port.sort}):
+        needed = port in job.node.inputs and (accepted is None or port.name in accepted)
+        if _plain(port.sort):
             continue
         if called in spoken or needed or port.name in found.memory:
             place = job.source.place.at("source") if job.source is not None else None
@@ -197,10 +202,8 @@ def _declared(job: Job, source: Source) -> SubjectFile:
         faults += (Diagnostic("HYPO106", "a Python class computes with float64, not float32", place),)
     if faults:
         raise Rejected(*faults)
-    spec = {"class": source.class_name, "params": coded(dict(params)), "memory": dict(source.memory), "attributes": []}
-    return SubjectFile(
-        source.python, path, json.dumps(spec), dict(source.memory), True, True, source.class_name, dict(params)
-    )
+    function = _driving(source.class_name, params, source.memory)
+    return SubjectFile(source.python, path, function, dict(source.memory), True, True, source.class_name, dict(params))
 
 
 def parameter_files(job: Job) -> tuple[Path, ...]:
@@ -210,15 +213,8 @@ def parameter_files(job: Job) -> tuple[Path, ...]:
     return (path,) if path is not None else ()
 
 
-def _unfit(ports: Mapping[str, Sort]) -> str:
-    """The first port whose values cannot be given to a step class; empty if there is none."""
-    for name, sort in ports.items():
-        if not _plain(sort):
-            return name
-    return ""
-
-
 def _plain(sort: Sort) -> bool:
+    """Whether values of the sort can be given to a step class."""
     match sort:
         case SequenceSort(item=item):
             return isinstance(item, _PLAIN)
@@ -289,9 +285,8 @@ def _arguments(
         problems.append(Diagnostic("HYPO104", message, _span(definition, file)))
     inputs = [port.name for port in (*job.node.inputs, *job.node.fixed)]
     arguments = definition.args
-    optional = len(arguments.defaults)
     positional = [*arguments.posonlyargs, *arguments.args]
-    required = (positional[: len(positional) - optional] if optional else positional)[method:]
+    required = positional[: len(positional) - len(arguments.defaults)][method:]
     required += [a for a, default in zip(arguments.kwonlyargs, arguments.kw_defaults, strict=True) if default is None]
     for argument in required:
         if argument in arguments.posonlyargs:

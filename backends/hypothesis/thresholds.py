@@ -14,18 +14,16 @@ from typing import Any
 
 from avow.backend_kit.programs.samples import numbers_of, worked_out
 from avow.base.files import text_or_nothing
+from avow.evaluation.evaluate import NotEvaluable, evaluate
+from avow.formulas.traversal import transform
 from avow.language.sorts import IntegerSort, NaturalSort, RealSort
 from avow.language.subterms import subterms
-from avow.language.terms import Arithmetic, Compare, Literal, Negative, Term, Widen
+from avow.language.terms import Arithmetic, Compare, Literal, Negative, Role, Term, Variable, Widen
 
 from . import tuning
 
 _STEP = Fraction(1, 1000)
 """The distance from a threshold at which a value is tried on either side."""
-
-
-_Sum = dict[Term | None, Fraction]
-"""The coefficients of non-arithmetic terms, and the constant under None."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -173,48 +171,34 @@ def _neighbours(number: Fraction) -> Iterator[Fraction]:
 
 
 def _meeting(comparison: Compare) -> set[Fraction]:
-    """Where the two sides are equal, if there is a single unknown: ``4 * gauge < 20`` has its threshold at 5."""
-    left, right = _linear(comparison.left), _linear(comparison.right)
-    apart = _plus(left, right, Fraction(-1)) if left is not None and right is not None else {}
-    slopes = [slope for part, slope in apart.items() if part is not None]
-    if len(slopes) != 1:
+    """Where the two sides are equal, if they are linear in a single unknown: ``4 * gauge < 20`` has its threshold at 5.
+    Three values of the unknown decide both."""
+    unknown = {*_unknowns(comparison.left), *_unknowns(comparison.right)}
+    if len(unknown) != 1 or not isinstance(comparison.left.sort, RealSort | IntegerSort | NaturalSort):
         return set()
-    meeting = -apart.get(None, Fraction(0)) / slopes[0]
+    variable = Variable(Role.INPUT, "unknown", RealSort())
+    left, right = (
+        transform(side, lambda part: variable if part in unknown else part)
+        for side in (comparison.left, comparison.right)
+    )
+    apart: list[Fraction] = []
+    for at in map(Fraction, (1, 2, 3)):
+        values = {variable.qualified: at}
+        try:
+            apart.append(Fraction(evaluate(left, values)) - Fraction(evaluate(right, values)))  # type: ignore[arg-type]
+        except NotEvaluable:
+            return set()
+    slope = apart[1] - apart[0]
+    if not slope or apart[2] - apart[1] != slope:
+        return set()
+    meeting = 1 - apart[0] / slope
     return {meeting, Fraction(math.floor(meeting)), Fraction(math.ceil(meeting))}
 
 
-def _plus(one: _Sum, other: _Sum, factor: Fraction) -> _Sum:
-    parts = dict.fromkeys((*one, *other))
-    total = {part: one.get(part, Fraction(0)) + factor * other.get(part, Fraction(0)) for part in parts}
-    return {part: coefficient for part, coefficient in total.items() if coefficient}
-
-
-def _linear(term: Term) -> _Sum | None:
-    """The term as a sum over non-arithmetic terms; None if it is not linear in them."""
-    match term:
-        case Literal(value=bool() | str()):
-            return None
-        case Literal(value=value):
-            return {None: Fraction(value)}
-        case Widen(term=inner):
-            return _linear(inner)
-        case Negative(term=inner):
-            turned = _linear(inner)
-            return None if turned is None else _plus({}, turned, Fraction(-1))
-        case Arithmetic(operator=operator, left=left, right=right):
-            one, other = _linear(left), _linear(right)
-            if one is None or other is None:
-                return None
-            match operator:
-                case "+" | "-":
-                    return _plus(one, other, Fraction(1 if operator == "+" else -1))
-                case "*" if other.keys() <= {None}:
-                    return _plus({}, one, other.get(None, Fraction(0)))
-                case "*" if one.keys() <= {None}:
-                    return _plus({}, other, one.get(None, Fraction(0)))
-                case "/" if other.keys() == {None}:
-                    return _plus({}, one, 1 / other[None])
-            return None
-        case _ if isinstance(term.sort, RealSort | IntegerSort | NaturalSort):
-            return {term: Fraction(1)}
-    return None
+def _unknowns(term: Term) -> Iterator[Term]:
+    """The parts of a sum or product that are not calculated from others."""
+    if isinstance(term, Arithmetic | Negative | Widen):
+        for part in term.children:
+            yield from _unknowns(part)
+    elif not isinstance(term, Literal):
+        yield term

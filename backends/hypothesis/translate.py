@@ -178,6 +178,8 @@ class Translator:
                 return f"{self._at(arguments[0], _SIGN)} % {self._at(arguments[1], _SIGN)}", _MULTIPLY
             case t.Builtin.DIV:
                 return f"{self._at(arguments[0], _SIGN)} // {self._at(arguments[1], _SIGN)}", _MULTIPLY
+            case t.Builtin.SQRT:
+                raise Untranslatable("floating point has square roots only nearly")
 
     def _conjunction(self, items: Sequence[t.Term]) -> str:
         """``0 <= x and x < 9`` as a chain of comparisons."""

@@ -20,7 +20,7 @@ class Unit:
 
     def __init__(self, asked: Question, patience: float) -> None:
         self.asked, self.patience = asked, patience
-        self.process = SubjectProcess(asked.path, asked.function, patience, asked.root)
+        self.process = SubjectProcess(asked.subject.path, asked.subject.function, patience, asked.root)
         self.inputs = {p.name: p.sort for p in asked.inputs}
         self.outputs = {p.name: p.sort for p in asked.outputs}
         self.doubles = asked.numbers != EXACT
@@ -29,18 +29,18 @@ class Unit:
 
     def begin(self) -> dict[str, Value]:
         """A new run of a new object; its memory. Raises SubjectFailed."""
-        return self._held(self._drive({"steps": []})["held"]) if self.asked.driven else {}
+        return self._held(self._drive({"steps": []})["held"]) if self.asked.subject.driven else {}
 
     def advance(self, inputs: Inputs, instead: Mapping[str, str] | None = None) -> dict[str, Value]:
         """One step's outputs, with memory among them; `instead`: floats for some inputs. Raises SubjectFailed."""
         step = self.step_of(inputs) | {n: {"f": text} for n, text in (instead or {}).items()}
-        if not self.asked.driven:
+        if not self.asked.subject.driven:
             return self.read(self.request(step))
         (answer,) = self._drive({"on": True, "steps": [step]})["steps"]
         if "error" in answer:
             raise SubjectFailed(f"the step raises {answer['why']}")
-        returned = {n: s for n, s in self.outputs.items() if n not in self.asked.held}
-        unread = [name.removeprefix("out.") for name in self.asked.left_out if name.startswith("out.")]
+        returned = {n: s for n, s in self.outputs.items() if n not in self.asked.subject.held}
+        unread = [name.removeprefix("out.") for name in self.asked.subject.left_out if name.startswith("out.")]
         try:
             found = outputs(answer["value"], returned, unread) if returned else {}
             held = {n: v for n, v in answer["memory"].items() if n in self.outputs}
@@ -50,15 +50,17 @@ class Unit:
 
     def memory(self, found: Mapping[str, Value]) -> dict[str, Value]:
         """Its memory after a step with these outputs."""
-        names = [n for n in self.asked.held if n in self.inputs]
+        names = [n for n in self.asked.subject.held if n in self.inputs]
         if all(n in found for n in names):
             return {n: found[n] for n in names}
         return self._held(self._drive({"on": True, "steps": []})["held"])
 
     def step_of(self, inputs: Inputs) -> dict[str, Any]:
         """The inputs that are passed, as data."""
-        driven, accepted = self.asked.driven, self.asked.accepted
-        passed = inputs.keys() - self.asked.held.keys() if driven or accepted is None else inputs.keys() & accepted
+        driven, accepted = self.asked.subject.driven, self.asked.subject.accepted
+        passed = (
+            inputs.keys() - self.asked.subject.held.keys() if driven or accepted is None else inputs.keys() & accepted
+        )
         given = {**{n: v for n, v in inputs.items() if n in passed}, **self.asked.constants}
         return {n: sent(v, doubles=self.doubles, lists=driven) for n, v in given.items()}
 
@@ -84,7 +86,7 @@ class Unit:
 
     def inputs_of(self, request: Mapping[str, Any]) -> Inputs:
         """The inputs in a request, as far as they can be read."""
-        plain = request if not self.asked.driven else (json.loads(request["case"])["steps"] or [{}])[0]
+        plain = request if not self.asked.subject.driven else (json.loads(request["case"])["steps"] or [{}])[0]
         found: Inputs = {}
         for name, data in plain.items():
             if name in self.asked.constants:
@@ -104,7 +106,7 @@ class Unit:
 
     def differ(self, one: Any, other: Any) -> bool:
         """Whether two replies mean different outputs."""
-        if self.asked.driven or isinstance(one, str) or isinstance(other, str):
+        if self.asked.subject.driven or isinstance(one, str) or isinstance(other, str):
             return bool(one != other)
         try:
             return self.read(one) != self.read(other)
@@ -119,7 +121,7 @@ class Unit:
         return json.loads(reply)
 
     def _held(self, data: Mapping[str, Any]) -> dict[str, Value]:
-        names = [n for n in self.asked.held if n in self.inputs]
+        names = [n for n in self.asked.subject.held if n in self.inputs]
         try:
             return {n: received(data[n], self.inputs[n], f"in.{n}") for n in names}
         except Malformed as error:

@@ -4,13 +4,17 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 from avow.backend_kit.given import file_path, summarized
+from avow.backend_kit.one_step import refusal
 from avow.backend_kit.protocol import Backend, Job, Limits, OutsideCheck, Report, Tool
 from avow.base.codes import Catalogue
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.tools import PERCEPTION, onnxruntime_tool, package_tool
 from avow.base.verdict import Link, Object, Verdict
+from avow.language.contract import Clause, Node
+from avow.language.subterms import histories
 
 from .options import SCHEMA, read
+from .two_steps import compares_steps
 from .vnnlib import SCALED, queries
 
 _MARABOU = (
@@ -25,12 +29,13 @@ class OnnxBackend(Backend):
 
     name = "onnx"
     title = "Neural networks: interval bounds, Marabou, and runs in onnxruntime"
-    version = "1"
+    version = "2"
     strength = Verdict.PROVED
     link = Link.MAPPED
     of = Object.MODEL
     uses_scenario = False
     uses_wiring = False
+    remembers = True
     portable = True
     not_run = "a network's inputs and outputs are float32"
     options_schema = SCHEMA
@@ -42,6 +47,10 @@ class OnnxBackend(Backend):
 
     def tools(self) -> tuple[Tool, ...]:
         return (onnxruntime_tool(), package_tool("maraboupy", PERCEPTION, _MARABOU))
+
+    def unsaid(self, node: Node, clause: Clause) -> str | None:
+        refused = next((a for a in node.assumptions if histories(a.formula)), None)
+        return refusal(self.name, node, refused or clause) if refused or not compares_steps(clause.formula) else None
 
     def check(self, job: Job) -> tuple[Diagnostic, ...]:
         try:

@@ -66,7 +66,7 @@ def denials(guarantee: t.Term, assumed: Iterable[t.Term], given: Given) -> tuple
             found = _both(linear.whole(each, True), found)
         except NotLinear:
             left.append(each)
-    return tuple(found), tuple(left)
+    return tuple((*case, *linear.rises()) for case in found), tuple(left)
 
 
 class _Linear:
@@ -142,8 +142,18 @@ class _Linear:
                 ]
         raise NotLinear(_shown(term))
 
+    def rises(self) -> Case:
+        """That each rise of an input is the difference of two: in both directions."""
+        count = 0 if self.given.one is None else self.given.one.network.inputs
+        links = (
+            Affine({("X", 2 * count + k): Fraction(1), ("X", count + k): Fraction(-1), ("X", k): Fraction(1)})
+            for k in range(count)
+        )
+        return tuple(Constraint(link.times(Fraction(sign))) for link in links for sign in (1, -1))
+
     def compared(self, operator: str, difference: Affine, positive: bool) -> list[Case]:
         """The difference of the two sides, compared with zero."""
+        difference = by_rises(difference, self.given)
         if not positive:
             operator = {"<": ">=", "<=": ">", ">": "<=", ">=": "<", "==": "!=", "!=": "=="}[operator]
         down, up = difference, difference.times(Fraction(-1))
@@ -190,6 +200,19 @@ class _Linear:
             if isinstance(output := self.given.outputs.get(variable.qualified), Scaled):
                 return Affine({("Y", output.index): output.scale}, output.offset)
         raise NotLinear(_shown(term))
+
+
+def by_rises(left: Affine, given: Given) -> Affine:
+    """The sum with the rise in place of each difference of one quantity at two steps."""
+    for (kind, index), by in left.terms.items() if given.one is not None else ():
+        count = given.network.inputs if kind == "X" else len(given.network.outputs)
+        third = count // 3
+        other = left.terms.get((kind, index - third), Fraction(0))
+        if index // third == 1 and by * other < 0:
+            part = min(abs(by), abs(other)) * (1 if by > 0 else -1)
+            rise = Affine({(kind, index + third): part, (kind, index): -part, (kind, index - third): part})
+            left = left.plus(rise)
+    return left
 
 
 def _possible(constraint: Constraint) -> bool:

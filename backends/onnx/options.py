@@ -59,6 +59,8 @@ class Given:
     box: tuple[Term, ...]
     """As formulas; `box_text` is for people."""
     box_text: str
+    one: Given | None = None
+    """If `network` has two copies of a network and their rises, for two steps (`two_steps`): what is given of one."""
 
 
 def read(job: Job) -> Given:

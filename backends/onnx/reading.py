@@ -40,6 +40,9 @@ class Relu:
     of: int
 
 
+Neuron = Sum | Relu
+
+
 @dataclass(frozen=True, slots=True)
 class Network:
     """The neurons 0 to `inputs` - 1 are the inputs, in the order of the input tensor's elements; `neurons` follow."""
@@ -47,7 +50,7 @@ class Network:
     inputs: int
     shape: tuple[int, ...]
     """Of the input tensor; a free dimension is 1."""
-    neurons: tuple[Sum | Relu, ...]
+    neurons: tuple[Neuron, ...]
     outputs: tuple[int, ...]
 
 

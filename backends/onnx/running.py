@@ -18,6 +18,7 @@ from .cases import Box, Side
 from .options import Argmax, Given, Scaled, Threshold
 from .reading import Network, Relu, Sum
 from .tuning import ALIKE
+from .two_steps import BEFORE
 
 Point = tuple[float, ...]
 """Inputs of the network, each a float32."""
@@ -46,6 +47,15 @@ class Runtime:
         apart = [abs(ours - theirs) for ours, theirs in zip(known, found, strict=True)]
         self.difference = max(self.difference, *apart)
         return all(by <= ALIKE * (1 + abs(ours)) for by, ours in zip(apart, known, strict=True))
+
+    def two(self, node: Node, point: Point) -> dict[str, Value] | None:
+        """As `ports`, at two steps (`two_steps`): the inputs before, those now, and their rises. One that does not rise
+        is the same at both."""
+        count = self._given.network.inputs
+        first, second, rises = (point[k * count : (k + 1) * count] for k in range(3))
+        before = self.ports(node, first)
+        now = self.ports(node, tuple(x if d else b for b, x, d in zip(first, second, rises, strict=True)))
+        return None if before is None or now is None else {**now, **{n + BEFORE: v for n, v in before.items()}}
 
     def ports(self, node: Node, point: Point) -> dict[str, Value] | None:
         """The values of the connected ports; None if an output is not finite."""

@@ -6,7 +6,7 @@ import contextlib
 import random
 import time
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from typing import Any
 
@@ -21,7 +21,6 @@ from avow.evidence.obligation import Obligation
 from avow.evidence.record import CASE
 from avow.formulas.conditions import conditions
 from avow.formulas.values import Binary, show
-from avow.language.contract import Clause
 from avow.language.terms import FALSE, Term
 from avow.solving.questions import solve
 
@@ -31,6 +30,7 @@ from .marabou import SAT, UNSAT, ask
 from .options import Given
 from .running import Point, Runtime, corners, nearest, sides
 from .tuning import MARGIN, SAMPLES
+from .two_steps import Claim, claims, excluded_by_slopes
 
 
 @dataclass(slots=True)
@@ -73,31 +73,34 @@ class _Work:
     def outcome(self, obligation: Obligation) -> tuple[Outcome, str]:
         clause = self.job.clause(obligation)
         assumed = {**{c.name: c.formula for c in self.job.node.assumptions}, **dict(_named(self.given.box))}
-        try:
-            cases, left = denials(clause.formula, assumed.values(), self.given)
-        except NotLinear as part:
-            why = f"{part} is not linear over connected ports, so this method has no question for it"
-            return Outcome(obligation.id, Verdict.UNKNOWN, why), ""
-        holds, allowed = Formula.of(clause), tuple(Formula.made(name, term) for name, term in assumed.items())
-        found = self.search(obligation, cases, holds, allowed)
+        found, count, left = _Found(), 0, list[Term]()
+        each = claims(clause.formula, assumed, self.given)
+        for claim in each:
+            try:
+                cases, unused = denials(claim.formula, claim.assumed.values(), claim.given)
+            except NotLinear as part:
+                why = f"{part} is not linear over connected ports, so this method has no question for it"
+                return Outcome(obligation.id, Verdict.UNKNOWN, why), ""
+            count, left = count + len(cases), [*left, *unused]
+            replace(self, given=claim.given).search(obligation, claim, cases, found)
+            if found.broken:
+                break
         hypotheses = [f"not linear, and not used: assumption {name}" for name, term in assumed.items() if term in left]
-        return self.verdict(obligation, clause, cases, assumed, found, hypotheses), "\n".join(found.log) + "\n"
+        return self.verdict(obligation, each[-1], count, found, hypotheses), "\n".join(found.log) + "\n"
 
-    def search(
-        self, obligation: Obligation, cases: tuple[Case, ...], holds: Formula, allowed: tuple[Formula, ...]
-    ) -> _Found:
-        found = _Found()
+    def search(self, obligation: Obligation, claim: Claim, cases: tuple[Case, ...], found: _Found) -> None:
+        holds = Formula.made(self.job.clause(obligation).name, claim.formula)
+        allowed = tuple(Formula.made(name, term) for name, term in claim.assumed.items())
         for point in self.job.kept.get(obligation.id, ()):
             if len(point) == self.given.network.inputs and self.breaks(tuple(point), holds, allowed, found):
-                return found
+                return
         for number, case in enumerate(cases, 1):
             why = self.case(case, holds, allowed, found, max(10, SAMPLES // len(cases)))
             found.log.append(f"case {number}: {why}")
             if found.broken:
-                return found
+                return
             if why not in (_INTERVALS, UNSAT):
                 found.open = found.open or why
-        return found
 
     def case(self, case: Case, holds: Formula, allowed: tuple[Formula, ...], found: _Found, samples: int) -> str:
         """What became of a case: `_INTERVALS`, Marabou's `unsat`, or why it is open."""
@@ -113,12 +116,17 @@ class _Work:
         if excluded(case, network, known):
             found.by_intervals += 1
             return _INTERVALS
+        if self.given.one is not None and excluded_by_slopes(case, self.given, within, self.end):
+            found.by_intervals += 1
+            return _INTERVALS
         single = sides(within)
         for point in corners(single, self.draw, samples) if single else ():
             if time.monotonic() > self.end:
                 return _TIME
             if self.breaks(point, holds, allowed, found):
                 return "a point that was drawn is a counterexample"
+        if self.given.one is not None:
+            return "bounds of slopes do not exclude it, nor do points that were drawn show it"
         return self.asked(case, known, single, holds, allowed, found)
 
     def asked(
@@ -141,7 +149,8 @@ class _Work:
 
     def breaks(self, point: Point, holds: Formula, allowed: tuple[Formula, ...], found: _Found) -> bool:
         """Whether the network, run at this point, denies the guarantee under the assumptions."""
-        ports = self.runtime.ports(self.job.node, point)
+        read = self.runtime.ports if self.given.one is None else self.runtime.two
+        ports = read(self.job.node, point)
         if ports is None or not all(each.holds(ports) is True for each in allowed) or holds.holds(ports) is not False:
             return False
         # digits of a float32 are shown unless the guarantee holds of what they say
@@ -156,25 +165,19 @@ class _Work:
         return True
 
     def verdict(
-        self,
-        obligation: Obligation,
-        clause: Clause,
-        cases: tuple[Case, ...],
-        assumed: Mapping[str, Term],
-        found: _Found,
-        hypotheses: list[str],
+        self, obligation: Obligation, claim: Claim, cases: int, found: _Found, hypotheses: list[str]
     ) -> Outcome:
-        details: dict[str, object] = {"cases": len(cases)}
+        details: dict[str, object] = {"cases": cases}
         if found.broken is not None:
             kept = {**details, CASE: list(found.point)}
             return Outcome(obligation.id, Verdict.REFUTED, found.broken.text(), found.broken, details=kept)
         done = found.by_intervals + found.by_marabou
         if found.open:
-            why = f"{done} of {count(len(cases), 'case')} settled: {found.open}"
+            why = f"{done} of {count(cases, 'case')} settled: {found.open}"
             return Outcome(obligation.id, Verdict.UNKNOWN, why, details=details)
         details |= {"by interval bounds": found.by_intervals, "by Marabou": found.by_marabou}
         summary = (
-            f"proved of the network in exact reals: {count(len(cases), 'case')} of its denial, {found.by_intervals} "
+            f"proved of the network in exact reals: {count(cases, 'case')} of its denial, {found.by_intervals} "
             f"excluded by interval bounds and {found.by_marabou} by Marabou"
         )
         rests: tuple[Hypothesis, ...] = ()
@@ -187,7 +190,7 @@ class _Work:
             summary,
             hypotheses=(*hypotheses, *self.supposed(found)),
             details=details,
-            vacuous=_vacuous(clause, assumed),
+            vacuous=_vacuous(claim),
             rests_on=rests,
         )
 
@@ -224,8 +227,8 @@ def _named(terms: Iterable[Term]) -> Iterable[tuple[str, Term]]:
     return ((f"box {k}", term) for k, term in enumerate(terms, 1))
 
 
-def _vacuous(clause: Clause, assumed: Mapping[str, Term]) -> bool:
+def _vacuous(claim: Claim) -> bool:
     """Whether no input meets the assumptions and a condition of the guarantee."""
-    whens = [each.formula for each in conditions(clause.formula)]
-    asked = [{**assumed, "when": when} for when in whens] or [dict(assumed)]
+    whens = [each.formula for each in conditions(claim.formula)]
+    asked = [{**claim.assumed, "when": when} for when in whens] or [{**claim.assumed}]
     return all(solve(each, effort=JUDGE_EFFORT, values="unused").status == "unsat" for each in asked)

@@ -23,3 +23,7 @@ counts: rounding in float32 makes some 1e-6."""
 ROUNDS = 3
 """How often each constraint on inputs tightens their box: as many as a chain of comparisons has links. Marabou may take
 a minute for what this excludes at once."""
+
+CELLS = 500
+"""Cells of a box in which slopes are bounded, before a case of two steps is left: some seconds, if the network has a
+thousand weights."""

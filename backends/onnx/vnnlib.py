@@ -8,6 +8,7 @@ from fractions import Fraction
 
 from avow.backend_kit.protocol import Job
 from avow.base.plain import decimal
+from avow.language.subterms import histories
 
 from .cases import Case, Constraint, NotLinear, denials
 from .options import Given
@@ -17,11 +18,13 @@ SCALED = "(* "
 
 
 def queries(job: Job, given: Given) -> Iterator[tuple[str, str, str]]:
-    """The guarantee's name, a file's name, and its text. None for a guarantee that is not linear."""
+    """The guarantee's name, a file's name, and its text. None for a guarantee that is not linear or of two steps."""
     assumed = [*(clause.formula for clause in job.node.assumptions), *given.box]
     for obligation in job.obligations:
+        if histories(formula := job.clause(obligation).formula):  # of two networks: the format is of one
+            continue
         try:
-            cases, _ = denials(job.clause(obligation).formula, assumed, given)
+            cases, _ = denials(formula, assumed, given)
         except NotLinear:
             continue
         for number, case in enumerate(cases, 1):

@@ -7,17 +7,19 @@ the last one. An unreadable answer keeps its place.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Set
 from dataclasses import replace
 from fractions import Fraction
 from functools import reduce
 from operator import and_
 from typing import TYPE_CHECKING, Any
 
+from avow.formulas.formula import free_variables
 from avow.formulas.values import Value
 from avow.language.contract import ClauseKind
 
-from .pairing import EARLY, Asked, Choices, Pairing, ticks, time_of
+from .pace import Passage
+from .pairing import EARLY, Asked, Choices, ticks, time_of
 from .reading import Reader
 from .rules import of_latest
 from .tuning import BREACHES_IN_DOUBT, KEYS_KEPT
@@ -167,10 +169,32 @@ def asks(monitor: Monitor, watched: Watched) -> tuple[str, ...]:
     return tuple(dict.fromkeys((*watched.paired, *(n for n in monitor.assumed if n in monitor.paired))))
 
 
-def saw(monitor: Monitor, pairing: Pairing, name: str, event: Mapping[str, Any], value: Value | None) -> None:
-    """A message of an input has come (None: it could not be read)."""
-    now, key = time_of(event), pairing.key(event, pairing.answers.input)
-    pairing.saw(name, ticks(now), float(now), key, value, monitor.at[name][0])
+def saw(monitor: Monitor, name: str, event: Mapping[str, Any], value: Value | None) -> None:
+    """A message of a variable has come (None: it could not be read), which answers may be paired with."""
+    pairing = monitor.kept
+    if pairing is not None and (monitor.pairing is None or name in monitor.paired):
+        now, key = time_of(event), pairing.key(event, pairing.answers.input)
+        pairing.saw(name, ticks(now), float(now), key, value, monitor.at.get(name, (monitor.events, ""))[0])
+
+
+def unknown(monitor: Monitor, name: str, event: Mapping[str, Any]) -> None:
+    """A variable's value is now unknown: clauses that need it wait for the next good message."""
+    monitor.miss({name})
+    if of_latest(monitor.setup.rules[name]):
+        monitor.forget(name)
+    saw(monitor, name, event, None)
+
+
+def passages(monitor: Monitor, names: Set[str]) -> list[tuple[str, Passage]]:
+    """The losses on the topics that carry some variables, and of transforms and the clock."""
+    every = monitor.timing.passages.items()
+    return [(t, passage) for t, passage in every if not (own := monitor.carried(t)) or not names.isdisjoint(own)]
+
+
+def unheard(monitor: Monitor, clause: str) -> str:
+    """Why messages that a clause speaks of were not heard, according to the record; empty if they were."""
+    names = {v.qualified for v in free_variables(monitor.setup.node.clause(clause).formula)}
+    return next((f"not all was heard: {p.unheard}" for _, p in passages(monitor, names) if p.unheard), "")
 
 
 def accused(monitor: Monitor, watched: Watched, values: Mapping[str, Value]) -> bool:

@@ -20,7 +20,7 @@ import numpy as np
 import numpy.typing as npt
 
 from avow.evaluation.evaluate import NotEvaluable
-from avow.ros.bags import ENVELOPE, LIVE, Event
+from avow.ros.bags import ENVELOPE, GONE, LIVE, LOST, PUBLISHER, Event
 
 from .answers import sure
 from .batch import NONE, UNKNOWN, UNREADABLE, Batch, Column, Flags, Floats, Ints, combinations, of_events
@@ -329,7 +329,8 @@ class Columns:
         can check the clock. Raises Rejected, OSError."""
         for chunk in chunks(read, name):
             events, lines, count, wrong = parsed(chunk, name, self._line, self._services)
-            self._one_by_one = self._one_by_one or (self._by_arrival and LIVE.encode() in chunk)
+            marks = (LOST, GONE, PUBLISHER, *([LIVE] if self._by_arrival else []))
+            self._one_by_one = self._one_by_one or any(mark.encode() in chunk for mark in marks)
             yield from self._judged(events, lines)
             self._line += count
             if wrong is not None:

@@ -107,7 +107,7 @@ def command(
             live is None and any((enforce, seconds, record, verdicts)),
             "--enforce, --for, --record, --verdicts need --live",
         ),
-        (sum(given is not None for given in (trace, live, port)) != 1, "give a TRACE, --live GRAPH or --serve PORT"),
+        (sum(given is not None for given in (trace, live, port)) != 1, "give one: TRACE, --live GRAPH, --serve PORT"),
         (live and timeline and not record, "with --live, --timeline needs --record: it is drawn from the record"),
         (suffix in (".mcap", ".bag", ".db3"), f"--record writes JSON lines, not {suffix}; --mcap writes verdicts"),
         (timeline and not live and trace in (None, "-"), "--timeline needs a TRACE that can be read twice: a file"),
@@ -310,10 +310,8 @@ def _print_summary(running: Session, further: int) -> None:
             words.append(tally.reason)
         if monitor.backwards:
             words.append(f"no evidence: {monitor.backwards}")
-        if tally.unpaired:
-            words.append("no evidence: the plan does not say which input an answer answered (`answers`)")
         click.echo(f"  {monitor.setup.node.name}.{name} ({kind}): {'; '.join(words)}")
-    passages = {topic: passage for monitor in running.monitors for topic, passage in monitor.passages()}
+    passages = {topic: passage for monitor in running.monitors for topic, passage in monitor.timing.passages.items()}
     if gone := [f"{topic} lost {p.lost}" for topic, p in passages.items() if p.lost]:
         click.echo(f"messages lost, by their numbers: {', '.join(gone)}")
     if mixed := [f"{topic} {p.disordered}" for topic, p in passages.items() if p.disordered]:
@@ -334,7 +332,8 @@ def _print_summary(running: Session, further: int) -> None:
     if not any(True for _ in running.clauses()):
         summary.append("nothing was judged: write what a node promises in place of `to_write`")
     elif not _anything_judged(running):
-        why = "no clause ever had a value for all that it speaks of" if running.events else "no event came"
+        quiet = "no event came; of a running robot: is it up, in the domain and network that are listened to?"
+        why = "no clause ever had a value for all that it speaks of" if running.events else quiet
         summary.append(f"nothing was judged: {why}")
     fine = "nothing broken in what was decided" if unmonitored else "nothing broken"
     click.echo(f"{running.events} events: {', '.join(summary) or fine}")

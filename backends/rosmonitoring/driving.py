@@ -15,7 +15,7 @@ from avow.backend_kit.programs.compared import Compared, compared
 from avow.base.codec import document
 from avow.base.files import write_out
 from avow.base.workspace import system_folder
-from avow.ros.bags import fields_of
+from avow.ros.bags import GONE, fields_of
 from avow.system.load import load_system
 
 from .traces import read_trace
@@ -105,7 +105,7 @@ def _recorded(found: Driver, trace: Path) -> Iterator[tuple[Event, Any]]:
     before = 0
     for recorded in read_trace(trace, wanted=lambda topic: _whole(topic) in found.carried):
         topic = _whole(str(recorded.event["topic"]))
-        if topic not in found.carried:
+        if topic not in found.carried or GONE in recorded.event:
             continue
         at = round(Fraction(exact(recorded.event["time"])) * SECOND)
         where = f"{trace}:{recorded.line}" if recorded.line else f"{trace}, message {recorded.index}"

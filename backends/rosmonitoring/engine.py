@@ -19,7 +19,7 @@ from avow.formulas.formula import free_variables
 from avow.formulas.temporal.cells import remembers
 from avow.formulas.values import Value
 from avow.language.contract import Clause, ClauseKind
-from avow.ros.bags import LIVE, publisher
+from avow.ros.bags import GONE, LIVE, LOST, PUBLISHER, publisher
 from avow.ros.frames import TREE, Tree
 
 from . import answers
@@ -170,7 +170,10 @@ class Monitor:
             self.tree.hear(same_topic(topic), event)
         if LIVE in event and self.by_arrival and self.doubts is None:
             self.doubts = Doubts.beginning(self.values)
-        readers = answers.own(self, readers, event) if readers and self.setup.shared else readers
+        if LOST in event or GONE in event:
+            return self._gap(event, same_topic(str(topic)))
+        if readers and (self.setup.shared or PUBLISHER in event):
+            readers = answers.own(self, readers, event)
         names = [name for name, _ in readers or ()]
         if readers is not None and self.so_far is not None and self._timed:
             self.so_far.hears(time_of(event), self._timed)
@@ -200,11 +203,22 @@ class Monitor:
             self.settle(ticks(time_of(event)), found)
         return found
 
+    def _gap(self, event: Mapping[str, Any], topic: str) -> list[Violation]:
+        """Messages of a topic were not heard, or nobody publishes it any more."""
+        found = self._tick(event, frozenset())
+        if not self.listens(topic):
+            return found
+        passage = self.timing.passages.setdefault(topic, Passage())
+        passage.gap, passage.unheard = True, passage.unheard or str(event.get(LOST, ""))
+        for name in self.carried(topic):
+            answers.unknown(self, name, event)
+        return found
+
     def read(
         self, event: Mapping[str, Any], place: int, readers: Sequence[tuple[str, Reader]], found: list[Violation]
     ) -> dict[str, bool]:
         """A message's variables, and whether they could be read."""
-        pairing, updated = self.pairing, dict[str, bool]()
+        updated = dict[str, bool]()
         self.at.update(dict.fromkeys((name for name, _ in readers), (place or self.events, publisher(event))))
         for name, read in readers:
             old = self.values.get(name)
@@ -214,18 +228,12 @@ class Monitor:
                 if self.tallies and not isinstance(error, Unplaced):  # a node without clauses to judge misses no value
                     found.append(self.violation(Fault.MAPPING, name, event, str(error)))
                 self.unread.setdefault(name, str(error))
-                self.miss({name})
-                # Its value is now unknown: clauses that need it wait for the next good message.
-                if of_latest(self.setup.rules[name]):
-                    self.forget(name)
-                if self.kept is not None and (pairing is None or name in self.paired):
-                    answers.saw(self, self.kept, name, event, None)
+                answers.unknown(self, name, event)
                 updated[name] = False
                 continue
             self.supposed.discard(name)
             updated[name] = True
-            if self.kept is not None and (pairing is None or name in self.paired):
-                answers.saw(self, self.kept, name, event, new)
+            answers.saw(self, name, event, new)
             if old is None or new != old:
                 self.values[name] = new
                 self.versions[name] += 1
@@ -319,14 +327,6 @@ class Monitor:
             elif self.values.get(name) is not value:
                 self.values[name] = value
                 self.versions[name] += 1
-
-    def passages(self, names: Set[str] | None = None) -> list[tuple[str, Passage]]:
-        """The losses on the topics that carry some variables (by default any)."""
-        return [
-            (topic, passage)
-            for topic, passage in self.timing.passages.items()
-            if names is None or names & set(self.carried(topic))
-        ]
 
     @property
     def silent(self) -> dict[str, str]:

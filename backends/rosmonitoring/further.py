@@ -47,11 +47,21 @@ def contradictions(job: Job, names: Sequence[str], seconds: float) -> tuple[tupl
         path = inside(job.root, name)
         if path is not None and leads(job, name):
             one = of_job(job, name, path, time.process_time() + seconds)
-            found = {each.obligation: each for each in one.refuted()} | found
+            found = {each.obligation: _elsewhere(job, name, each) for each in one.refuted()} | found
             doubts += one.doubts.values()
             if one.late:
                 return tuple(found.values()), tuple(doubts), one.late
     return tuple(found.values()), tuple(doubts), ""
+
+
+def _elsewhere(job: Job, name: str, found: Outcome) -> Outcome:
+    """A refuted guarantee of another node may have been repaired since, and its own recording replaced."""
+    node, kind, clause = found.obligation.split("/", 2)
+    if kind != Kind.GUARANTEE or node == job.node.name:
+        return found
+    text = f"repair what the counterexample of {node}.{clause} shows; if {name}, which {job.node.name} names, was made "
+    text += f"with an older program, record again, or name under `outside` the inputs that {node} fed"
+    return replace(found, details={**found.details, "next": text})
 
 
 def leads(job: Job, name: str) -> bool:

@@ -32,15 +32,15 @@ def readable(setup: Setup, path: Path, where: Origin) -> tuple[Diagnostic, ...]:
     kinds = setup.kinds
     topics = {name: same_topic(rule.topic) for name, rule in setup.carried.items()}
     said = {topic for name, topic in topics.items() if name.startswith(f"{Role.OUTPUT}.")}
-    known = {topics[name]: who for name, (_, who) in setup.shared.items()}
+    known = {topics[name]: who for name, who in setup.shared.items()}
     hint = "model the others too, or give their names under `ros: {nodes: …}`"
     for topic, who in found.publishers.items():
         modelled = known.get(same_topic(topic))
         if modelled is not None and (strange := [name for name in who if name not in modelled]):
             text = f"{path.name}: {' and '.join(strange)} publish {topic}, and in the contract {', '.join(modelled)} do"
             return (Diagnostic("MON207", text, hint=hint),)
-        if modelled is None and same_topic(topic) in said and len(who) > 1:
-            text = f"{path.name}: {' and '.join(who)} publish {topic}, and in the contract {setup.node.name} alone does"
+        if modelled is None and same_topic(topic) in said and any(map(setup.strange, who)):
+            text = f"{path.name}: {' and '.join(who)} published {topic}, and in the contract {setup.placed} alone does"
             return (Diagnostic("MON207", text, hint=hint),)
     calls = [topic for topic in setup.topics if is_service_part(topic)]
     if calls and not found.ros2:
@@ -77,7 +77,7 @@ def _conflicts(path: Path, found: Carried, known: Definitions, types: Mapping[st
             yield Diagnostic("MON205", text)
         for name, mine, theirs in _differences(there, known.messages, found.known) if there == canonical(kind) else ():
             here = f"{_fields(mine)} by {mine.source or 'the definition that is known'}"
-            hint = "the plan's `messages:` or `ros: {distro: …}` names another definition"
+            hint = "record again, or name the definitions of that day by `messages:` or `ros: {distro: …}`"
             yield Diagnostic("MON205", f"{path.name}: {name} is {_fields(theirs)} there, and {here}", hint=hint)
 
 

@@ -11,17 +11,19 @@ from typing import Any
 
 from avow.base.diagnostics import Rejected
 from avow.base.suggestions import nearest, suggest
+from avow.evaluation.evaluate import NotEvaluable, evaluate
 from avow.formulas.values import FunctionValue, Value
 from avow.language import sorts as s
 from avow.language.contract import Node, Port
-from avow.language.terms import Role, Variable
+from avow.language.load import parse_term
+from avow.language.terms import Apply, Not, Quantified, Quantifier, Role, Term, Variable
 from avow.ros.definitions import INTEGERS, SCALARS, Array, Definitions, Message, Nested, NoField, Scalar, Wire
 from avow.system.graph import dataflow
-from avow.system.plan import Endpoint, Located, Plan, System, Table
+from avow.system.plan import Edge, Endpoint, Located, Plan, System, Table
 
 from .reading import SOURCES, Undecided, decide, shown, words
 from .rules import NOTHING_KNOWN, Argument, Choice, FieldPath, Fields, Gap, Hold, Lookup, Rule, Take
-from .wires import MappingError, converter, fits, parts_of
+from .wires import MappingError, converter, fits, parts_of, whole
 
 
 class Wrong(Exception):  # noqa: N818 - it is what was found wrong
@@ -448,3 +450,30 @@ def written_out(entry: Any) -> Mapping[str, Any]:
         return {"field" if isinstance(entry, str) else "fields": entry}
     found: Mapping[str, Any] = entry or {}
     return found
+
+
+def first_value(system: System, port: Port, edge: Edge) -> Value | None:
+    """A delayed edge's first value, if the plan sets one: a value as text, or the formula of an empty relation."""
+    if edge.initial is None:
+        return None
+    source = system.contract.node(edge.source.node)
+    try:
+        term = parse_term(edge.initial, source, system.contract, edge.span)
+        if not isinstance(term.sort, s.BoolSort) or isinstance(port.sort, s.BoolSort):
+            value = evaluate(term, {})
+            # any kind of number: 1 is a REAL's first value as well as 1.0
+            return whole(value) if isinstance(port.sort, s.RealSort) and type(value) is int else value
+    except (Rejected, NotEvaluable):
+        return None
+    return FunctionValue({}, False) if _says_empty(term, edge.source.port) else None
+
+
+def _says_empty(term: Term, port: str) -> bool:
+    """``forall(x, y in REAL | not out.at(x, y))``."""
+    match term:
+        case Quantified(
+            quantifier=Quantifier.FORALL, variables=bound, body=Not(body=Apply(function=f, arguments=args))
+        ):
+            return isinstance(f, Variable) and (f.role, f.name) == (Role.OUTPUT, port) and args == bound
+        case _:  # of another form
+            return False

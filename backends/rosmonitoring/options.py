@@ -12,15 +12,13 @@ from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.files import inside
 from avow.base.plain import listed
 from avow.base.suggestions import nearest, suggest
-from avow.evaluation.evaluate import NotEvaluable, evaluate
 from avow.formulas.formula import free_variables
 from avow.formulas.values import FunctionValue, Value
 from avow.language.contract import Node, Port, Topic
-from avow.language.load import parse_term
-from avow.language.sorts import BOOL, BoolSort, FunctionSort, RealSort
-from avow.language.terms import Apply, Not, Quantified, Quantifier, Role, Term, Variable
+from avow.language.sorts import BOOL, FunctionSort
+from avow.language.terms import Role
 from avow.ros.bags import Event, Origin, is_bag, publisher
-from avow.ros.calls import CALL, is_part, named, part_topic
+from avow.ros.calls import CALL, is_part, named, pairing, part_topic
 from avow.ros.definitions import Definitions, Message, NoField, Wire
 from avow.ros.sources import definitions
 from avow.system.graph import dataflow
@@ -33,7 +31,7 @@ from .reading import Undecided, from_text, shown
 from .rules import Choice, Constant, FieldPath, Fields, Previous, Rule, of_latest, otherwise, read_from_inputs
 from .traces import carried
 from .tuning import DECIDED_SHARE
-from .wires import MappingError, parts_of, table_of, whole
+from .wires import MappingError, parts_of, table_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,16 +64,24 @@ class Setup:
     leeway: Leeway = field(default_factory=Leeway)
     time: By = By.RECEIPT
     """The clock by which its messages are timed."""
-    shared: Mapping[str, tuple[str, tuple[str, ...]]] = field(default_factory=dict)
-    """Each output whose topic other nodes publish too: this node, and all of them, by their full names."""
+    shared: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    """Each output whose topic other nodes publish too: the full names of all its publishers."""
+    placed: str = ""
+    """The node's full name; empty if nobody asks who published."""
 
     def whose(self, name: str, event: Event) -> bool | None:
-        """Whether an event's message is the node's own, for a variable that it carries; None if that is not known."""
-        if name not in self.shared:
-            return True
-        own, known = self.shared[name]
+        """Whether an event's message is the node's own, for a variable that it carries; None if that is not known. A
+        message without a name is taken for the node's own if the contract has no other publisher; so is any that a
+        filter guards."""
         by = publisher(event)
-        return by == own if by in known else None
+        if name in self.shared:
+            return by == self.placed if by in self.shared[name] else None
+        guarded = same_topic(self.carried[name].topic) in self.filtered
+        return None if self.strange(by) and name.startswith(f"{Role.OUTPUT}.") and not guarded else True
+
+    def strange(self, by: str) -> bool:
+        """Whether this is the name of a node, and not of this one."""
+        return bool(by and self.placed) and by != self.placed
 
     @property
     def carried(self) -> dict[str, Fields | Choice]:
@@ -93,7 +99,8 @@ class Setup:
         if not set() < carried.keys() & self.heard < carried.keys():
             return ""
         if answers is None:
-            return "the plan does not say which input an answer answered: add `answers` to the method"
+            proposed = pairing({rule.topic: rule.kind for rule in self.carried.values()}, self.known)
+            return f"the plan does not say which input an answer answered: add `answers: {proposed}`, or another way"
         alone = [name for name, rule in carried.items() if not is_part(rule.topic)]
         if answers.by == "call" and not answers.others and alone:
             return f"{alone[0]} is part of no call: pair the others by latency (`answers: {{by: call, others: …}}`)"
@@ -140,7 +147,7 @@ def setup(
         node, work.rules, work.hidden, str(data.get("when", "outputs")), known, answers,
         float(data.get("decided", DECIDED_SHARE)), named, work.fresh(data.get("fresh")), work.rates(data.get("rate")),
         work.duration("max_age", data["max_age"]) if "max_age" in data else None, data.get("losses"), work.filtered(),
-        leeway, By(str(data.get("time", By.RECEIPT))), work.shared,
+        leeway, By(str(data.get("time", By.RECEIPT))), work.shared, system.plan.ros.names.placed(node.name).name,
     )  # fmt: skip
     return made, tuple(work.faults)
 
@@ -201,7 +208,7 @@ class _Work:
     known: Definitions
     rules: dict[str, Rule] = field(default_factory=dict)
     hidden: dict[str, str] = field(default_factory=dict)
-    shared: dict[str, tuple[str, tuple[str, ...]]] = field(default_factory=dict)
+    shared: dict[str, tuple[str, ...]] = field(default_factory=dict)
     faults: list[Diagnostic] = field(default_factory=list)
     meant: set[str] = field(default_factory=set)
     """The variables whose names are probably misspelt in the mapping: that is reported, and what follows is not."""
@@ -368,7 +375,9 @@ class _Work:
             return self.previous(port, entry)
         if entry is None and topic is None:
             if edge is not None and edge.delayed and edge.source.node == self.node.name:
-                return Previous(port.variable, f"out.{edge.source.port}", self.first(port, edge))
+                return Previous(
+                    port.variable, f"out.{edge.source.port}", observing.first_value(self.system, port, edge)
+                )
             if edge is None and self.interpretation(port) is not None:
                 return self.scenario(port)
         if edge is not None and edge.source.node != self.node.name:
@@ -386,7 +395,7 @@ class _Work:
             return f"{listed(carriers)} carry {name}, and a monitor reads one: `mapping` says which"
         for several, who in self.system.plan.ros.shared:
             if port.role is Role.OUTPUT and same_topic(topic) == same_topic(several):
-                self.shared[name] = self.system.plan.ros.names.placed(self.node.name).name, who
+                self.shared[name] = who
         return self.observed(port, topic, kind, entry)
 
     def observed(self, port: Port, topic: str, kind: str | None, entry: Any) -> Rule | str:
@@ -459,7 +468,7 @@ class _Work:
         told = entry.get("initial")
         initial = None if told is None else observing.literal(told, port.sort, "initial")
         if initial is None and (edge := self.edge(port)) and edge.delayed:
-            initial = self.first(port, edge)
+            initial = observing.first_value(self.system, port, edge)
         return Previous(port.variable, f"out.{name}", initial)
 
     def edge(self, port: Port) -> Edge | None:
@@ -469,32 +478,6 @@ class _Work:
             return None
         return next((e for e in feeding if e.target.port == port.name), None)
 
-    def first(self, port: Port, edge: Edge) -> Value | None:
-        """A delayed edge's first value, if the plan sets one: a value as text, or the formula of an empty relation."""
-        if edge.initial is None:
-            return None
-        source = self.system.contract.node(edge.source.node)
-        try:
-            term = parse_term(edge.initial, source, self.system.contract, edge.span)
-            if not isinstance(term.sort, BoolSort) or isinstance(port.sort, BoolSort):
-                value = evaluate(term, {})
-                # any kind of number: 1 is a REAL's first value as well as 1.0
-                return whole(value) if isinstance(port.sort, RealSort) and type(value) is int else value
-        except (Rejected, NotEvaluable):
-            return None
-        return FunctionValue({}, False) if _says_empty(term, edge.source.port) else None
-
 
 _PAIR = "or pair by `latency` or `arrival` (in a second method, for these `guarantees:` alone)"
 _FIELD_HINT = "name the field under `mapping`, for instance `in.x: pose.x`"
-
-
-def _says_empty(term: Term, port: str) -> bool:
-    """``forall(x, y in REAL | not out.at(x, y))``."""
-    match term:
-        case Quantified(
-            quantifier=Quantifier.FORALL, variables=bound, body=Not(body=Apply(function=f, arguments=args))
-        ):
-            return isinstance(f, Variable) and (f.role, f.name) == (Role.OUTPUT, port) and args == bound
-        case _:  # of another form
-            return False

@@ -123,6 +123,10 @@ class Passage:
     disordered: int = 0
     uncounted: str = ""
     """Why a loss may not be visible."""
+    unheard: str = ""
+    """Why messages were not heard, according to the one who recorded."""
+    gap: bool = False
+    """Some may have been published since the latest one."""
     latest: Fraction | None = None
     alike: int = 1
     """The number of consecutive messages so far that have the latest time."""
@@ -140,9 +144,10 @@ class Passage:
             self.advanced = self.advanced or now != self.latest
         self.latest = now
         number = sequence(event)
+        missed, self.gap = self.gap, False
         if number is None:
             self.uncounted = "have no numbers (header.seq)"
-            return False
+            return missed
         before = self.last[0] if self.last else number
         if self.last:
             gap = number - self.last[0]
@@ -151,7 +156,7 @@ class Passage:
             if gap <= 0:  # never set, several publishers, or one that restarted
                 self.uncounted = self.uncounted or "have numbers (header.seq) that do not rise"
         self.last[:] = [number]
-        return number - before not in (0, 1)
+        return missed or number - before not in (0, 1)
 
 
 SEQUENCE = ("header", "seq")

@@ -57,7 +57,7 @@ def discharge(job: Job, traces: Mapping[str, str], limits: Limits) -> Report:
     for name, digest in traces.items():
         run = _judge(job, name, [Monitor(found, [o.name for o in job.obligations])], deadline)
         if digest and not run.digest:
-            run.missing = f"the recording {name} (SHA-256 {digest}) is not here"
+            run.missing = f"the recording {name} (SHA-256 {digest}) is not here: fetch it first, also in CI"
         elif digest and run.digest != digest:
             run.trouble = f"{name} is not the recording that the plan names: its digest is {run.digest}"
         if any(v.fault is Fault.PROVIDER for v in run.first.values()):
@@ -187,7 +187,7 @@ def judge(job: Job) -> Callable[[Iterable[Mapping[str, Any]] | Path], JudgedRun]
     """As `Backend.judge`. In a generated run, answers are paired with inputs by arrival, unless the options say
     otherwise, and deadlines of the wire (`fresh`, `rate`) do not apply. Raises Rejected."""
     found = usable(job.system, job.node, job.method.options)
-    used = replace(found, answers=found.answers or ARRIVAL, fresh={}, rates={}, shared={})
+    used = replace(found, answers=found.answers or ARRIVAL, fresh={}, rates={}, shared={}, placed="")
     names = [o.name for o in job.obligations]
     unsaid = {name: unmonitored(used, job.node.clause(name)) or "" for name in names}
 

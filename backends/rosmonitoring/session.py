@@ -19,6 +19,7 @@ from avow.ros.bags import is_bag, recorded
 from avow.ros.definitions import Definitions
 from avow.system.plan import System
 
+from .answers import unheard
 from .backend import SCHEMA
 from .batch import of_arrays, of_messages
 from .blame import Blame
@@ -198,15 +199,17 @@ class Session:
         _report_withheld(self.monitors, self.behind_filters)
 
     def unmonitored(self) -> dict[str, str]:
-        """The clauses of monitored nodes for which too few publications were decided, or whose inputs were too old,
-        each with a proposal for the plan, or the reason."""
+        """The clauses of monitored nodes for which too few publications were decided, whose inputs were too old, or
+        whose answers are not paired with inputs, each with a proposal for the plan, or the reason."""
         found = {}
         for monitor, name, kind, tally in self.clauses():
             if monitor.setup.node.name not in self.asked or tally.hidden:
                 continue
             few = tally.decided < monitor.setup.decided * _asked(kind, tally)
-            if aged := too_old(tally.ages, monitor.setup.max_age):
-                found[f"{monitor.setup.node.name}.{name}"] = aged
+            if wrong := unheard(monitor, name) or too_old(tally.ages, monitor.setup.max_age):
+                found[f"{monitor.setup.node.name}.{name}"] = wrong
+            elif tally.unpaired:
+                found[f"{monitor.setup.node.name}.{name}"] = monitor.setup.unmarked(monitor.setup.carried, typed=False)
             elif not tally.decided or monitor.backwards or few:
                 why = remedies(tally, monitor.silent, monitor.unread) or tally.reason
                 found[f"{monitor.setup.node.name}.{name}"] = why
@@ -258,7 +261,7 @@ class Session:
             ]
             topics = {
                 topic: {"lost": None if p.uncounted else p.lost, "out_of_order": p.disordered}
-                for topic, p in monitor.passages()
+                for topic, p in monitor.timing.passages.items()
             }
             name = monitor.setup.node.name
             nodes.append({"node": name, "relevant": monitor.relevant, "clauses": clauses, "topics": topics})

@@ -103,6 +103,9 @@ def _wrong_time(event: Event) -> str:
         return f"`time` is no number of seconds: {_json(raw)}"
 
 
+_FORM = 'each line is one event, {"topic": "/x", "time": 0.1, …}, without [ ]; a bag is a folder, .mcap, .db3 or .bag'
+
+
 def _json(raw: object) -> str:
     return raw.decode()[:60] if isinstance(raw, bytes) else json.dumps(raw, default=str)[:60]
 
@@ -117,10 +120,11 @@ def event_of(line: str, name: str, number: int, services: Services) -> Event | N
     try:
         event = services.part(parse_event(line))
     except json.JSONDecodeError as error:
-        why = "one event a line, without [ ]" if line.lstrip().startswith("[") else error.msg
-        raise Rejected(_fault(name, number, error.colno, f"this is not JSON: {why}")) from None
+        cut = error.msg.startswith("Unterminated") or not line[error.pos :].strip()
+        why = "this is not JSON" + (": the line is cut off" if cut else "")
+        raise Rejected(_fault(name, number, error.colno, why, _FORM)) from None
     except ValueError as error:
-        raise Rejected(_fault(name, number, 1, str(error))) from None
+        raise Rejected(_fault(name, number, 1, str(error), _FORM)) from None
     topic = event.get("topic")
     nameless = "" if isinstance(topic, str) and topic else "the event has no `topic`: a name"
     for key, wrong in (("topic", nameless), ("time", _wrong_time(event))):

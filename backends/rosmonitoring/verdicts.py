@@ -9,6 +9,7 @@ from operator import or_
 
 from avow.base.verdict import Counterexample, Outcome, Verdict
 
+from .answers import passages, unheard
 from .engine import Monitor
 from .lanes import Marks, Signals
 from .options import same_topic
@@ -75,9 +76,10 @@ class Shown:
         self.ages: dict[str, float] = {}
         for of, age in (each for t in tallies for each in t.ages.items()):
             self.ages[of] = max(age, self.ages.get(of, 0.0))
-        passages = [(topic, p) for run in runs for topic, p in run.monitor.passages(names)]
-        self.lost, self.disordered = sum(p.lost for _, p in passages), sum(p.disordered for _, p in passages)
-        self.uncounted = sorted({f"the messages of {topic} {p.uncounted}" for topic, p in passages if p.uncounted})
+        found = [(topic, p) for run in runs for topic, p in passages(run.monitor, names)]
+        self.lost, self.disordered = sum(p.lost for _, p in found), sum(p.disordered for _, p in found)
+        self.uncounted = sorted({f"the messages of {topic} {p.uncounted}" for topic, p in found if p.uncounted})
+        self.unheard = next(filter(None, (unheard(run.monitor, name) for run in runs)), "")
         self.backwards = next((f"{run.name}: {run.monitor.backwards}" for run in runs if run.monitor.backwards), "")
         self.late = next((run.unknown for run in runs if run.unknown), "")
 
@@ -167,6 +169,8 @@ def _silent(s: Shown) -> Answer | None:
 
 
 def _lost(s: Shown) -> Answer | None:
+    if s.unheard:
+        return Answer(Verdict.UNKNOWN, s.unheard)
     allowed = s.setup.losses
     if allowed is None or not (s.uncounted or s.lost > allowed):
         return None
@@ -192,9 +196,9 @@ def _never(s: Shown) -> Answer | None:
 def _unmonitored(s: Shown) -> Answer | None:
     if s.decided >= s.setup.decided * s.asked:
         return None
-    text = f"unmonitored: {s.decided} of {s.asked} publications were decided ({s.lacking})"
-    text += f": {'; '.join(s.reasons)}" if s.reasons else ""
-    return Answer(Verdict.UNKNOWN, f"{text}. {s.wanted}" if s.wanted else text)
+    text = f"unmonitored: {s.decided} of {s.asked} publications were decided"
+    # the remedy comes early, since a next step clips the text
+    return Answer(Verdict.UNKNOWN, "; ".join(filter(None, (text, s.wanted, s.lacking, *s.reasons))))
 
 
 def _unpaired(s: Shown) -> Answer | None:

@@ -102,7 +102,10 @@ class Tally:
     def unsure(self, reason: str, several: int = 1) -> None:
         """It is undecided what one answer, or several, answered."""
         self.order += several
-        self.reason = self.reason or reason
+        if reason.endswith(UNSAID):
+            self.awaited[reason.removesuffix(UNSAID)] = None
+        if not self.reason or self.reason.endswith(UNSAID):  # an initial value helps, and others keep what else does
+            self.reason = reason
 
     def aged(self, now: float, heard: Mapping[str, float], names: Iterable[str]) -> None:
         """An answer has come; `heard`: when its inputs had come, including those of these names."""
@@ -115,10 +118,12 @@ class Tally:
             self.ages[name] = age
 
     def unnamed(self, topic: str) -> None:
-        """A message of a topic that other nodes publish too has come, without a record of its publisher."""
+        """A message has come that is by no node that publishes its topic in the contract, as far as it is recorded."""
         self.published += 1
         self.nameless += 1
-        self.reason = self.reason or f"several nodes publish {topic}, and a message has no `_publisher` (its node)"
+        self.reason = (
+            self.reason or f"a message of {topic} is by no node that publishes it in the contract (`_publisher`)"
+        )
 
     reason: str = ""
     """Why it is not judged at all, or the first reason why a judgement was undecided."""
@@ -163,8 +168,7 @@ def remedies(tally: Tally, silent: Mapping[str, str], unread: Mapping[str, str])
     read, and why."""
     share = int(100 * tally.decided / tally.asked) / 100 if tally.asked else 0
     wanted = dict.fromkeys((*tally.awaited, *tally.reason.split()))
-    unsaid = tally.reason.removesuffix(UNSAID) if tally.reason.endswith(UNSAID) else ""
-    late = ", ".join(n for n in dict.fromkeys((*tally.awaited, unsaid)) if n and n not in silent and n not in unread)
+    late = ", ".join(n for n in tally.awaited if n not in silent and n not in unread)
     gone = ", ".join(dict.fromkeys(silent[name] for name in wanted if name in silent))
     wrong = "; ".join(f"{name}: {unread[name]}" for name in wanted if name in unread)
     said = f"give its value before the first message, mapping: {{{late.partition(',')[0]}: {{…, initial: …}}}}"
@@ -174,9 +178,11 @@ def remedies(tally: Tally, silent: Mapping[str, str], unread: Mapping[str, str])
         (late, f"{late} had no value when answers came (a latched topic, or a late publisher): {said}"),
         (tally.order and tally.unpaired, "pair answers with inputs by a stamp or a key (`answers`)"),
         (tally.reason == DEPENDS, "pair answers by a stamp or a key, or measure a shorter latency (`answers`)"),
-        (LEAST_SHARE <= share < 1 and tally.triggered and not unread, f"accept a smaller share, decided: {share:g}"),
+        (tally.partial, "its outputs come on several topics, not always together: judge at each, `when: any`"),
     )
-    return "; or ".join(words for applies, words in parts if applies)
+    mends = "; and ".join(words for applies, words in parts if applies)
+    less = LEAST_SHARE <= share < 1 and tally.triggered and not unread
+    return "; or ".join(filter(None, (mends, f"accept a smaller share, decided: {share:g}" if less else "")))
 
 
 def too_old(ages: Mapping[str, float], limit: Fraction | None) -> str:

@@ -21,21 +21,24 @@ from avow.evidence.obligation import Kind, Obligation
 from avow.evidence.record import CASE, ISOLATION, SIGNED_BY, SOLVER, Evidence
 from avow.evidence.status import Status
 from avow.report.short import terminal_lines
-from avow.system.plan import Finding, Located, Requirement
+from avow.system.pieces import Located, Piece
+from avow.system.plan import Finding, Requirement
 from avow.system.schema import plan_schema, violations
 
 
 def located(data: Any) -> Located:
-    spans: dict[tuple[str | int, ...], Span] = {}
+    lines = itertools.count(1)
 
-    def mark(value: Any, path: tuple[str | int, ...]) -> None:
-        spans[path] = Span("plan.yaml", len(spans) + 1, 1, len(spans) + 1, 9)
-        items = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
-        for key, item in items:
-            mark(item, (*path, key))
+    def piece(value: Any) -> Piece:
+        line = next(lines)
+        made = Piece(Span("plan.yaml", line, 1, line, 9), value)
+        if isinstance(value, dict):
+            made.entries = {key: piece(item) for key, item in value.items()}
+        if isinstance(value, list):
+            made.items = [piece(item) for item in value]
+        return made
 
-    mark(data, ())
-    return Located(data, spans[()], spans)
+    return piece(data).located()
 
 
 def test_profiles_are_ready_and_ordered_by_strictness() -> None:
@@ -647,3 +650,13 @@ def test_a_refuted_guarantee_of_high_criticality_is_to_be_repaired(criticality: 
     (view,) = case(subject, [target], [evidence(target, Verdict.REFUTED)]).guarantees
     assert view.suggestion is not None
     assert ("accept it" in view.suggestion.text) == offered
+
+
+@pytest.mark.parametrize("verdict", [Verdict.PROVED, Verdict.REFUTED])
+def test_the_gate_of_findings_says_that_remarks_do_not_count(verdict: Verdict) -> None:
+    """A guarantee that is not needed is a remark: no gate fails, and none says that nothing is refuted."""
+    remark = obligation("n", Kind.SANITY, "needed-g")
+    found = case(system({"n": ["g"]}), [guarantee("n", "g"), remark], [evidence("n.g"), evidence(remark, verdict)])
+    (refuted,) = (gate for gate in found.gates if gate.id == "refuted")
+    assert refuted.passed
+    assert ("but for remarks" in refuted.reason) is (verdict is Verdict.REFUTED)

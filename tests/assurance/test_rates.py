@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -15,10 +16,12 @@ from avow.assurance.rates import misstated
 from avow.base.codec import from_json, to_json
 from avow.base.verdict import Verdict
 from avow.evidence.obligation import Kind
-from avow.evidence.record import COMPOSES, LIKELY, RATE, Evidence
+from avow.evidence.record import COMPOSES, LIKELY, LIKELY_LEAVES, RATE, Evidence
+from avow.kernel.rates import Likely, Trial
 from avow.report.explained import explained
 from avow.report.short import terminal_lines
 from avow.system.plan import Requirement
+from avow.system.probability import Probability
 
 
 def sampled(of: str, bound: str = "0.086", trials: int = 34, **more: Any) -> Evidence:
@@ -31,7 +34,12 @@ COMPOSED = {"at_once": True, "beyond": []}
 
 
 def three(
-    *records: Evidence, policy: Any = None, criticality: str = "medium", proof: dict[str, Any] | None = COMPOSED
+    *records: Evidence,
+    policy: Any = None,
+    criticality: str = "medium",
+    proof: dict[str, Any] | None = COMPOSED,
+    asked: Probability | None = None,
+    stated: Sequence[Likely] = (),
 ) -> Case:
     """A requirement that rests on one guarantee of each of three nodes; `proof`: how its proof composes them."""
     names = ("a", "b", "c")
@@ -39,10 +47,16 @@ def three(
     subject = system(
         {name: ["g"] for name in names},
         plans=[node_plan(name, criticality, "experiment", "hypothesis", "hoare") for name in names],
-        requirements=[Requirement("R", "All is well.", formula, None, tuple(f"{name}.g" for name in names))],
+        requirements=[
+            Requirement("R", "All is well.", formula, None, tuple(f"{name}.g" for name in names), probability=asked)
+        ],
         policy=policy,
     )
-    own = [] if proof is None else [evidence(OWN, Verdict.PROVED, "compose", details={COMPOSES: proof})]
+    own = (
+        []
+        if proof is None
+        else [evidence(OWN, Verdict.PROVED, "compose", details={COMPOSES: proof, LIKELY_LEAVES: to_json([*stated])})]
+    )
     obligations = [*(guarantee(name, "g") for name in names), *([OWN] if own else [])]
     return case(subject, obligations, [*records, *own])
 
@@ -142,16 +156,65 @@ def gate(found: Case) -> tuple[bool, str]:
 
 def test_the_policy_limits_the_rate_by_criticality() -> None:
     assert not any(g.id == "rates" for g in three(*ALL).gates)
-    sure = [sampled(f"{n}.g", "0.13", 40) for n in "abc"]
-    for record in sure:  # at 98 % each, 94 % together
-        record.details[RATE][0]["confidence"] = "0.98"
-    assert gate(three(*sure, policy={"max_failure_rate": {"medium": 0.4}}))[0]
+    assert gate(three(*sure(), policy={"max_failure_rate": {"medium": 0.4}}))[0]
     for limit in ({"medium": 0.3}, {"low": 0.3}, {"medium": 0.4, "low": 0.3}):
-        passed, why = gate(three(*sure, policy={"max_failure_rate": limit}))
+        passed, why = gate(three(*sure(), policy={"max_failure_rate": limit}))
         assert not passed
         assert "at most 39 % of steps fail" in why
         assert "at most 30 % is allowed" in why
-    assert gate(three(*sure, policy={"max_failure_rate": {"high": 0.3}}))[0]  # nothing is as critical
+    assert gate(three(*sure(), policy={"max_failure_rate": {"high": 0.3}}))[0]  # nothing is as critical
+
+
+def sure() -> list[Evidence]:
+    """At 98 % each, 94 % together: at most 39 % of steps fail."""
+    found = [sampled(f"{n}.g", "0.13", 40) for n in "abc"]
+    for record in found:
+        record.details[RATE][0]["confidence"] = "0.98"
+    return found
+
+
+@pytest.mark.parametrize(
+    ("records", "asked", "why"),
+    [
+        (sure(), Probability("0.6"), ""),
+        (sure(), Probability("0.65"), "at most 35 % is allowed"),
+        (sure(), Probability("0.6", steps=2), "at most 20 % is allowed"),
+        (sure(), Probability("0.6", per_run=True), "a rate of whole runs is asked"),
+        (of_runs(*sure()), Probability("0.6", per_run=True), ""),
+        (of_runs(*sure()), Probability("0.6"), ""),
+        (of_runs(*sure()), Probability("0.6", steps=9), "a rate of steps is asked"),  # the runs may be shorter
+        (of_runs(*sure()), Probability("0.8", per_run=True), "at most 20 % is allowed"),
+        (ALL, Probability("0.7"), "a confidence of 90 % is asked"),
+        (
+            (*sure()[:2], evidence("c.g", Verdict.TESTED, "hypothesis")),
+            Probability("0.7"),
+            "rate of the requirement unknown",
+        ),
+        ([evidence(f"{n}.g") for n in "abc"], Probability("0.99"), ""),
+    ],
+)
+def test_a_probability_is_shown_only_if_the_rate_of_its_samples_is_within_it(
+    records: Iterable[Evidence], asked: Probability, why: str
+) -> None:
+    """A guarantee without a probability takes no share in the proof, but its sample may fail as well."""
+    found = three(*records, asked=asked)
+    (requirement,) = found.requirements
+    assert requirement.level.holds is not bool(why)
+    (passed,) = (g.passed for g in found.gates if g.id == "requirements")
+    assert passed is not bool(why)
+    assert why.lower() in requirement.answer.lower()
+    assert why in requirement.too_often
+
+
+@pytest.mark.parametrize("least", ["0.6", "0.7"])
+def test_a_checked_probability_counts_with_what_it_states(least: str) -> None:
+    """A model checker bounds no failures in trials, and states a least probability."""
+    checked = evidence("c.g", Verdict.CHECKED, "storm", details={LIKELY: "3/5"})
+    stated = [Likely("c.g", least, Trial.STEP)]
+    (requirement,) = three(
+        evidence("a.g"), evidence("b.g"), checked, asked=Probability("0.65"), stated=stated
+    ).requirements
+    assert requirement.level.holds is (least == "0.7")
 
 
 def test_a_limit_asks_for_joint_confidence_and_for_a_rate() -> None:

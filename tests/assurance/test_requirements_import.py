@@ -64,6 +64,7 @@ def test_the_section_is_yaml_that_says_the_same(tmp_path: Path) -> None:
         ("a,b\n1,2\n", "no column", 1),
         ("id,text\nR1,x\nR1,y\n", "two requirements", 3),
         ("id,text\nR1,\n", "no text", 2),
+        ("id,text\n\n", "no requirement below its header", 1),
         ("id,text\nR1," + "x" * 200_000 + "\n", "no CSV", 2),
     ],
 )
@@ -94,7 +95,7 @@ def test_bad_reqif_is_refused(data: bytes) -> None:
 def test_unreadable_files_are_refused(tmp_path: Path) -> None:
     (tmp_path / "r.csv").write_bytes(b"id,text\nR1,\xff\n")
     for path in (tmp_path / "r.csv", tmp_path / "none.csv", tmp_path):
-        with pytest.raises(Rejected):
+        with pytest.raises(Rejected, match="export it as CSV" if path.name == "r.csv" else "cannot be read"):
             read_requirements(path)
 
 

@@ -22,7 +22,6 @@ from avow.base.tools import _Digest
 from avow.cli.recheck import _Report
 from avow.evidence.envelope import _Envelope
 from avow.evidence.heads import Line
-from avow.evidence.ledger import _Known
 from avow.fretish.project import _Export
 from avow.isolation.judge import _Word
 from avow.kernel.certificate import Certificate
@@ -41,7 +40,7 @@ KINDS: list[Any] = [
     runner.Shown,
 ]
 KINDS += [_Wanted, Line, _Word, Certificate, Checked, _Settled, Stamp, Rendering, _Overview, Listing]
-KINDS += [_Known, _Digest, _Report, _Export, _Envelope, Outer]
+KINDS += [_Digest, _Report, _Export, _Envelope, Outer]
 
 
 def sample(kind: Any) -> Any:

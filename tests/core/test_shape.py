@@ -52,6 +52,7 @@ ELSEWHERE = {
     "avow/base/tools.libraries": ONCE,
     "avow/calculus/entailment._kept": "where a work's answers are kept, for the time of that work",
     "avow/calculus/scenario._KEYS": KEPT,
+    "avow/evidence/ledger._code": ONCE,
     "avow/isolation/level.seals": ONCE,
     "avow/isolation/tracing.traces": ONCE,
     "avow/language/load._lately": KEPT,

@@ -61,6 +61,8 @@ class Knobs:
     """min, mod, if …, of numbers."""
     partial: bool = True
     """Elements of sequences, and quotients by what may be zero."""
+    roots: bool = False
+    """Square roots, also of what may be negative."""
     bare: float = 0.0
     """Of a part without parentheses."""
     wild: bool = False
@@ -226,6 +228,8 @@ class Formulas:
                 return f"({inner()} / {choice((2, 3, 7, '2.5')) if divisor == '0' else divisor})"
             case "if":
                 return self._either(of, depth, names)
+            case "builtin" if of == REAL and self.knobs.roots and self.random.random() < 0.7:
+                return choice((f"sqrt({inner()})", f"norm({inner()}, {inner()})"))
             case "builtin":
                 whole = inner(choice((INTEGER, NATURAL)) if of != NATURAL else NATURAL)
                 calls = [f"{choice(('min', 'max'))}({inner()}, {inner()})", f"abs({inner()})"]

@@ -869,7 +869,12 @@ REFUSED = {  # what is written in the place of a text of a node, and what is tol
         "time.sleep (",
     ),
     "another service": ("a service", "SetBool", "Trigger", "subscribes to /stop/_request as std_srvs/Trigger_Request"),
-    "no response": ("a service", "return response", "return None", "TypeError: /stop/_response: None is no std_srvs"),
+    "no response": (
+        "a service",
+        "return response",
+        "return None",
+        "callback of /stop returned None: return the response",
+    ),
     "not active": (
         *("a lifecycle node", "return super().on_activate(state)", "return TransitionCallbackReturn.FAILURE"),
         "RuntimeError: on_activate returned FAILURE: the node is inactive",

@@ -20,7 +20,7 @@ from assurance.sample import chain, evidence
 
 from avow.assurance.codec import evidence_schema
 from avow.base.codec import Unreadable, from_json
-from avow.base.files import sha256
+from avow.base.notes import cache_folder
 from avow.base.verdict import Counterexample, Verdict
 from avow.evidence import ledger as module
 from avow.evidence.ledger import GENESIS, Ledger, encode
@@ -281,36 +281,48 @@ def test_while_it_stands_still_nothing_is_read_and_nothing_written(tmp_path: Pat
     assert not ledger.damage
 
 
-def remembered(path: Path) -> Ledger:
-    ledger = Ledger(path, remembers=True)
-    ledger.append_all(some(6))
-    return ledger
-
-
-def test_lines_that_were_found_whole_are_not_checked_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.fixture
+def of_three(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A ledger of which groups of three lines are kept as read: two, and one line more."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    monkeypatch.setattr("avow.evidence.ledger.LINES_KEPT", 3)
     path = tmp_path / "x.jsonl"
-    remembered(path)
-    Ledger(path).append(evidence("node.later"))  # by one that leaves no note
+    Ledger(path, remembers=True).append_all(some(7))
+    return path
+
+
+def test_lines_that_were_found_whole_are_not_checked_again(of_three: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    Ledger(of_three).append(evidence("node.later"))  # by one that keeps nothing
     taken: list[int] = []
     take = Ledger._take
     monkeypatch.setattr(Ledger, "_take", lambda ledger, line: (taken.append(len(line)), take(ledger, line))[1])
-    again = Ledger(path, remembers=True)
-    assert again.records() == Ledger(path).records()
-    assert len(taken) == 1 + 7
-    assert again.append(some(6)[2]).number == 2, "what is there is known"
+    again = Ledger(of_three, remembers=True)
+    assert again.records() == Ledger(of_three).records()
+    assert len(taken) == 2 + 8
+    assert again.append(some(7)[2]).number == 2, "what is there is known"
     again.check()
-    assert again.records() == Ledger(path).records()
+    assert again.records() == Ledger(of_three).records()
     assert again.damage == ()
-    assert len(taken) == 1 + 7 + 7 + 7
+    assert len(taken) == 2 + 8 + 8 + 8
+
+
+def test_what_is_kept_of_a_record_is_all_of_it(of_three: Path) -> None:
+    """Equal numbers of different types, too: Python counts 1, 1.0 and true as one key."""
+    values = [1, True, 1.0, [1, "a"], {"a": {"b": 1}}, {"a": {"b": True}}, "a", None]
+    Ledger(of_three, remembers=True).append_all(
+        [replace(evidence(f"n.{at}"), details={"of": value, "a": "b"}) for at, value in enumerate(values)]
+    )
+    kept, read = Ledger(of_three, remembers=True).records(), Ledger(of_three).records()
+    assert [encode(entry.evidence) for entry in kept] == [encode(entry.evidence) for entry in read]
+    assert [json.dumps(entry.evidence.details["of"]) for entry in kept[7:]] == list(map(json.dumps, values))
 
 
 @pytest.mark.parametrize("at", [0, 2, 5])
 @pytest.mark.parametrize(
     ("old", "new"), [("proved", "tested"), ('"n":', '"n": '), ('"vacuous":false', '"vacuous":true ')]
 )
-def test_a_note_on_a_ledger_makes_no_edit_unseen(tmp_path: Path, at: int, old: str, new: str) -> None:
-    path = tmp_path / "x.jsonl"
-    remembered(path)
+def test_lines_kept_of_a_ledger_make_no_edit_unseen(of_three: Path, at: int, old: str, new: str) -> None:
+    path = of_three
     lines = path.read_text().splitlines(keepends=True)
     lines[at] = lines[at].replace(old, new, 1)
     path.write_text("".join(lines))
@@ -320,11 +332,8 @@ def test_a_note_on_a_ledger_makes_no_edit_unseen(tmp_path: Path, at: int, old: s
     assert Ledger(path, remembers=True).damage == Ledger(path).damage != ()
 
 
-def test_an_edited_note_on_a_ledger_is_none(tmp_path: Path) -> None:
-    path = tmp_path / "x.jsonl"
-    remembered(path)
-    note = path.with_name("x.jsonl.read")
-    path.write_text(path.read_text().replace("proved", "tested", 1))
-    said = json.loads(note.read_text()) | {"sha256": sha256(path.read_bytes())}
-    note.write_text(json.dumps(said))
-    assert Ledger(path, remembers=True).damage != ()
+def test_an_edited_group_of_lines_is_none(of_three: Path) -> None:
+    (folder,) = (cache_folder() / "ledgers").iterdir()
+    for path in folder.iterdir():
+        path.write_bytes(path.read_bytes().replace(b"proved", b"tested"))
+    assert Ledger(of_three, remembers=True).records() == Ledger(of_three).records()

@@ -234,6 +234,22 @@ def test_a_file_that_the_simulator_reads_has_to_be_named(tmp_path: Path) -> None
     assert settle(root).verdict is Verdict.UNKNOWN
 
 
+@pytest.mark.skipif(not traces(), reason="strace does not work here")
+def test_a_file_beside_the_systems_folder_has_to_be_copied_into_it(tmp_path: Path) -> None:
+    """Systems of a workspace may share files; those of a Python environment in it are no part of the robot."""
+    root = made(tmp_path / "contracts")
+    (tmp_path / "dodo.py").touch()
+    (tmp_path / "env").mkdir()
+    (tmp_path / "env/pyvenv.cfg").touch()
+    for name in ("env/grip.json", "grip.json"):
+        (tmp_path / name).write_text("0.5")
+    opened = f"json.load(open({str(tmp_path / 'env/grip.json')!r}))"
+    edit(root / "world.py", ("speed * 0.5", f"speed * {opened}"))
+    campaign(root)
+    edit(root / "world.py", ("env/grip.json", "grip.json"))
+    assert "into the system's folder" in campaign(root, code=2)
+
+
 def test_a_run_that_breaks_an_assumption_is_no_trial(tmp_path: Path) -> None:
     root = made(tmp_path)
     edit(root / "system.rcl", ("<= 9", "<= 0.5"))

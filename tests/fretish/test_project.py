@@ -129,7 +129,7 @@ def test_an_export_with_variables(tmp_path: Path) -> None:
     assert {p.name: p.type_name for p in node.outputs} == {"valve": "INTEGER"}
     assert [c.name for c in node.assumptions] == ["T_2_assumption"]
     assert [c.name for c in node.guarantees] == ["T_1", "T_5"]
-    for code in ("FRET002", "FRET003", "FRET004", "T-3", "T-4", "T-6", "sqrt"):
+    for code in ("FRET002", "FRET003", "FRET004", "T-3", "T-4", "T-6", "sqrt", "help: a sentence is"):
         assert code in done.stderr, code
     for place in ("export.json:1:",):
         assert place in done.stderr

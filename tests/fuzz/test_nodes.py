@@ -196,4 +196,5 @@ def test_it_does_not_compile(tmp_path: Path) -> None:
     assert {o.verdict for o in found.values()} == {Verdict.ERROR}
     assert "src/adapter.hpp:1" in found["same"].summary
     found = replace(LIMITER, adapter="struct Node {};\n").outcomes(tmp_path / "unnamed")
-    assert "adapter.hpp defines no `struct AvowNode`" in found["same"].summary
+    assert "adapter.hpp defines no `struct AvowNode` (`cpp` names the adapter" in found["same"].summary
+    assert "has no `void step" not in found["same"].summary

@@ -103,6 +103,7 @@ def test_codes_without_example_are_few() -> None:
         ("forall(a, b | a in REAL and b in REAL and a < b)", r"RCL120 .*\[write `forall\(x, y in REAL"),
         ("stat == red <-> both", r"RCL101 `<->` is not RCL \[write `<=>`\]"),
         ("in.r => out.both", r"RCL101 `=>` is not RCL \[write `->` \(if … then\), or `>=` \(at least\)\]"),
+        ("r < 90%", r"RCL101 .*0\.9 for 90 percent\]"),
         ("stat == red && TRUE", r"RCL101 .*\[write `and`\]"),
         ("∀ stat", "RCL101"),
         ("stat == réd", "RCL107"),
@@ -290,7 +291,10 @@ def test_several_variables_on_one_topic() -> None:
 @pytest.mark.parametrize(
     ("topics", "message"),
     [
-        ("p/T t matches(in.a), p/U t matches(in.b)", "RCL216 the topic `t` is listed twice, as p/T and as p/U"),
+        (
+            "p/T t matches(in.a), p/U t matches(in.b)",
+            "RCL216 the topic `t` is listed twice, as p/T and as p/U [correct one of them:",
+        ),
         ("p/T t matches(in.a), p/srv/T t matches(in.b)", "RCL216 the topic `t` is listed twice, as p/T and as p/srv/T"),
         ("p/T t matches(in.a), p/T t matches(in.a)", "RCL216 the topic `t` is listed twice"),
         ("p/T t matches(in.a), p/T t", "RCL216 the topic `t` is listed twice"),
@@ -300,6 +304,11 @@ def test_several_variables_on_one_topic() -> None:
 def test_what_is_ambiguous_about_a_topic(topics: str, message: str) -> None:
     (found,) = errors(TOPICS.format(topics))
     assert found.startswith(message)
+
+
+def test_a_brace_that_is_missing_is_told_as_that() -> None:
+    (found,) = errors("node n inputs( a : BOOL ) outputs( b : BOOL ) topics() guarantee g ( in.a ) }")
+    assert found == "RCL113 expected `{` after the node's name and not `inputs` [write `{` there]"
 
 
 def test_a_variable_on_two_topics_is_worth_a_warning() -> None:

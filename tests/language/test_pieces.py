@@ -187,7 +187,7 @@ def test_only_what_this_user_wrote_there_is_believed(
 ) -> None:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     counted(monkeypatch, *NODES[:2], folder=tmp_path)
-    (path,) = (cache_folder() / "shelves").iterdir()
+    (path,) = (cache_folder() / "texts").glob("*/*")
     data = path.read_bytes()
     match fault:
         case "edited":
@@ -200,7 +200,7 @@ def test_only_what_this_user_wrote_there_is_believed(
             path.write_bytes(sealed(path.with_name("other"), data[32:]))
         case "another's":
             monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "another"))
-            there = cache_folder() / "shelves" / path.name
+            there = cache_folder() / "texts" / path.parent.name / path.name
             there.parent.mkdir(parents=True)
             there.write_bytes(data)
         case _:

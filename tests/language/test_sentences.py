@@ -121,6 +121,7 @@ def test_comparisons_that_agree(sentence: str, formula: str) -> None:
         ("If b then the light is neither red nor amber", "in.b -> out.light == green", None),
         ("If b then the light is not red", "in.b -> out.light == green", None),
         ("Reddish light is fine", "in.b -> out.light == green", None),
+        ("If b then it greens the road", "in.b -> out.light == amber", None),  # a verb, not the element
         ("Nothing is stopped beyond b", "in.b -> out.light == green", None),
     ],
 )
@@ -154,7 +155,7 @@ def test_the_language_of_sentences() -> None:
     assert not is_one_way("It stops only while the door is open")
     assert both_ways("ok IFF ready") == "IFF"
     assert both_ways("ok if ready") is None
-    names = {"move": "move", "stop": "STOP", "on": "on"}
+    names = {"moves": "move", "moving": "move", "stopped": "STOP", "stopping": "STOP", "on": "on"}
     assert list(mentions("It moves on, Stopped or moving; not stopping, never removed", names)) == [
         ("moves", "move"),
         ("Stopped", "STOP"),

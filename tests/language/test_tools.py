@@ -88,6 +88,7 @@ def invoke(name: str, *arguments: str, stdin: str | None = None) -> tuple[int, s
 def test_check_off_and_folders(files: dict[str, str], tmp_path: Path) -> None:
     assert "RCL405" in invoke("check", files["good"])[1]
     assert "RCL405" not in invoke("check", "--off", "RCL405", files["good"])[1]
+    assert "no code RCL9999" in avow("check", "--off", "RCL9999", files["good"], cwd=tmp_path).stderr
     code, output = invoke("check", str(tmp_path / "sub"))
     assert code == 2
     assert "RCL201" in output

@@ -48,7 +48,8 @@ SAME = {
                     "not (a <=> not x)", "not (a != x)", "(not a or x) and (not x or a)"),
     "not the same": ("a <=> not x", "not (a <=> x)", "a != x", "(a or x) and not (a and x)",
                      "(a and not x) or (not a and x)"),
-    "always": ("x", "x and y", "x or y", "not x", "a and x", "x <=> y"),
+    "always": ("x", "x and y", "x or y", "not x", "a and x"),
+    "each the other": ("x <=> y", "y <=> x", "x == y", "(x -> y) and (y -> x)", "not (x <=> not y)"),
     "outputs": ("x -> y", "not x or y", "y or not x"),
 }  # fmt: skip
 

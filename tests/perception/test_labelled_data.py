@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -68,6 +69,16 @@ def test_the_network_decides(tmp_path: Path) -> None:
     assert blind["sees"].verdict is Verdict.REFUTED
     assert blind["same"].verdict is Verdict.REFUTED
     assert blind["kinds"].verdict is Verdict.TESTED
+
+
+def test_rows_that_failed_by_an_earlier_network_are_there_if_their_measurements_are(tmp_path: Path) -> None:
+    rows = drawn(1, 4)
+    blind = judged(tmp_path / "a", rows, scale=0.5)
+    for folder, table, wanted in (("b", rows, Verdict.TESTED), ("c", rows[1:], Verdict.UNKNOWN)):
+        again = job_of(tmp_path / folder, table)
+        kept = {o.id: (blind[o.name].details["case"],) for o in again.obligations if "case" in blind[o.name].details}
+        outcomes = settle(BACKEND, replace(again, kept=kept), tmp_path / f"{folder}-out", Limits()).outcomes
+        assert {o.verdict for o in outcomes if o.obligation in kept} == {wanted}
 
 
 @pytest.mark.parametrize(

@@ -108,6 +108,18 @@ def test_data_refute_what_they_contradict(
     assert refuted(place, folder) == broken
 
 
+def test_a_recording_of_an_older_program_has_a_next_step(place: Workspace) -> None:
+    """Another node names it; a node's own recording is replaced where its program is repaired."""
+    folder = write(place, TRACE, [*GOOD, (1.0, 10.5, 20.0)])
+    told = {r.obligation: r.details.get("next", "") for r in records(place, folder) if r.verdict is Verdict.REFUTED}
+    older = "if t.jsonl, which b names, was made with an older program, record again, or name under `outside`"
+    assert {claim: older in str(step) for claim, step in told.items()} == {
+        f"s/{A}": True,
+        "s/b/guarantee/h": False,
+        f"s/system/{Z}": False,
+    }
+
+
 def test_an_edit_re_runs_the_recordings_that_it_reaches(place: Workspace) -> None:
     """The first node that names a recording compares it with all claims; the others depend on what reaches them."""
     folder = write(place, TRACE, GOOD)

@@ -38,8 +38,8 @@ def test_the_shipped_account_is_complete() -> None:
     ("old", "new", "severity", "message"),
     some(
         [
-            ("    rviz: display only\n", "", Severity.WARNING, "rviz are neither dropped nor part"),
-            ("[imu, odometry, amcl]", "[imu, odometry]", Severity.WARNING, "amcl are neither dropped nor part"),
+            ("    rviz: display only\n", "", Severity.WARNING, "nor part of a node of the model: rviz"),
+            ("[imu, odometry, amcl]", "[imu, odometry]", Severity.WARNING, "nor part of a node of the model: amcl"),
             ("[imu, odometry, amcl]", "[imu, odometry, amlc]", Severity.ERROR, "'amlc' is not on the ROS graph"),
             (
                 "[imu, odometry, amcl]",

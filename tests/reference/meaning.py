@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
 from itertools import product
+from math import isqrt
 from typing import Any
 
 from avow.language import terms as t
@@ -32,6 +33,11 @@ COMPARED: Mapping[str, Callable[[Any, Any], bool]] = {
     ">": operator.gt,
     ">=": operator.ge,
 }
+
+
+NEAR = Fraction(1, 10**100)
+"""Numbers that are nearer to each other are the same: square roots are computed to twice as many digits, and nothing
+that tests say of their sums and products distinguishes numbers that are so near."""
 
 
 class NoValue(Exception):  # noqa: N818 - it names what a term has
@@ -135,8 +141,9 @@ def members(sort: Sort) -> list[Any]:
 
 @functools.lru_cache(maxsize=20_000)
 def has_value_always(term: t.Term) -> bool:
-    """Whether it has neither a quotient in it nor an element of a sequence."""
+    """Whether it has in it no quotient, no element of a sequence and no square root."""
     partial = isinstance(term, t.Index) or (isinstance(term, t.Arithmetic) and term.operator == "/")
+    partial = partial or (isinstance(term, t.Operation) and term.operator == "sqrt")
     return not partial and all(map(has_value_always, term.children))
 
 
@@ -186,7 +193,9 @@ class Meaning:
             case t.Iff(left=left, right=right):
                 return of(left) == of(right)
             case t.Compare(operator=sign, left=left, right=right):
-                return COMPARED[sign](of(left), of(right))
+                one, other = of(left), of(right)
+                near = isinstance(one, Fraction) and isinstance(other, Fraction) and abs(one - other) < NEAR
+                return COMPARED[sign](one, one if near else other)
             case t.In(item=item, collection=collection):
                 return of(item) in self._collected(collection, run, k, bound)
             case t.Conditional(condition=condition, then=then, otherwise=otherwise):
@@ -224,7 +233,8 @@ class Meaning:
                         return one * other
                 return Fraction(one) / other if other else self.without_value(term)
             case t.Operation(operator=name, arguments=arguments):
-                return _operation(name, list(map(of, arguments)))
+                given = list(map(of, arguments))
+                return self.without_value(term) if name == "sqrt" and given[0] <= -NEAR else _operation(name, given)
         return self.unwritten(term, run, k, bound)
 
     def without_value(self, term: t.Term) -> Any:
@@ -490,6 +500,10 @@ def _operation(name: str, given: list[Any]) -> Any:
             return Fraction(given[0] // given[1])
         case "mod":
             return given[0] - given[1] * (given[0] // given[1])
+        case "sqrt":
+            number, digits = Fraction(max(given[0], 0)), 10**200
+            exact = Fraction(isqrt(number.numerator), isqrt(number.denominator))
+            return exact if exact**2 == number else Fraction(isqrt(int(number * digits**2)), digits)
     raise AssertionError(f"the reference does not know {name}: describe it in {__file__}")
 
 

@@ -49,6 +49,16 @@ def shown(name: str) -> str:
     return out.getvalue()
 
 
+def test_what_goes_to_a_pipe_is_not_wrapped(capsys: pytest.CaptureFixture[str]) -> None:
+    target = guarantee("node", "a")
+    told = replace(
+        evidence(target, Verdict.REFUTED, "hoare"), summary="broken at event 413 of traces/run: " + "x " * 99
+    )
+    found = case(system({"node": ["a"]}), (target,), [told])
+    show_obligation(found, found.obligations[0])
+    assert told.summary.strip() in capsys.readouterr().out
+
+
 def test_advice_that_the_plan_expects_says_why() -> None:
     assert "expected by the plan: said [twice] in the paper" in shown("not-redundant")
 

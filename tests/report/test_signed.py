@@ -14,6 +14,7 @@ from click.testing import CliRunner
 from helpers import every_text
 
 from avow.assurance.answers import Baseline
+from avow.assurance.codec import read_case
 from avow.assurance.model import Case
 from avow.assurance.signed import newest_signed, sign_case
 from avow.assurance.state import baseline_of
@@ -239,3 +240,9 @@ def test_diff_against_a_signature_compares_what_was_signed(tmp_path: Path) -> No
     done = CliRunner().invoke(diff, [str(path), str(reports / "same")], standalone_mode=False)
     assert isinstance(done.exception, Rejected)
     assert done.exception.diagnostics[0].code == "DIFF001"
+    with pytest.raises(Rejected, match="no report, ledger") as caught:
+        CliRunner().invoke(diff, ["signed", str(reports / "same")], catch_exceptions=False)
+    assert "avow sign --report" in (caught.value.diagnostics[0].hint or "")
+    with pytest.raises(Rejected) as caught:
+        read_case(reports / "none/report.json")
+    assert "`avow verify` writes it" in (caught.value.diagnostics[0].hint or "")

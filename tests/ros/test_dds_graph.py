@@ -6,7 +6,7 @@ import struct
 
 import pytest
 
-from avow.ros.dds import _announced, listing_of
+from avow.ros.dds import _announced, carriers, dds_type, listing_of
 from avow.ros.listing import Listed, Listing
 
 NODE, OTHER = b"n" * 12, b"o" * 12
@@ -45,6 +45,30 @@ def test_topics_services_and_actions_are_told_apart() -> None:
             "/turn": "my/Turn",
         },
     )
+
+
+@pytest.mark.parametrize(
+    ("topic", "kind", "found"),
+    [
+        ("scan", "sensor_msgs/LaserScan", {"rt/scan": "sensor_msgs::msg::dds_::LaserScan_"}),
+        ("/ns/grip/_request", "a/Grip_Request", {"rq/ns/gripRequest": "a::srv::dds_::Grip_Request_"}),
+        ("/ns/grip/_response", "a/Grip_Response", {"rr/ns/gripReply": "a::srv::dds_::Grip_Response_"}),
+        ("/turn/_goal", "a/Turn_Goal", {"rq/turn/_action/send_goalRequest": "a::action::dds_::Turn_SendGoal_Request_"}),
+        ("/turn/_feedback", "a/Turn_Feedback", {"rt/turn/_action/feedback": "a::action::dds_::Turn_FeedbackMessage_"}),
+        (
+            "/turn/_result",
+            "a/Turn_Result",
+            {
+                "rq/turn/_action/get_resultRequest": "a::action::dds_::Turn_GetResult_Request_",
+                "rr/turn/_action/get_resultReply": "a::action::dds_::Turn_GetResult_Response_",
+            },
+        ),
+        ("/grip/_request_sent", "a/Grip_Request", {"rt/grip/_service_event": "a::srv::dds_::Grip_Event_"}),
+        ("/turn/_action/send_goal/_response", "a/Turn_SendGoal_Response", {}),
+    ],
+)
+def test_what_carries_a_topic_or_a_part_of_calls(topic: str, kind: str, found: dict[str, str]) -> None:
+    assert {each.topic: dds_type(each.kind) for each in carriers(topic, kind)} == found
 
 
 def announcement(size: int, name: str = "base", order: str = "<") -> bytes:

@@ -81,15 +81,18 @@ def test_what_is_no_definition_is_located(text: str, line: int) -> None:
 
 
 def test_services_and_actions_are_their_parts() -> None:
-    request, response = parse_parts("int32 a\n---\nbool ok\n", "p/Do", "srv")
-    assert (request.name, response.name) == ("p/Do_Request", "p/Do_Response")
+    request, response, event = parse_parts("int32 a\n---\nbool ok\n", "p/Do", "srv")
+    assert (request.name, response.name, event.name) == ("p/Do_Request", "p/Do_Response", "p/Do_Event")
     assert response.fields[0].wire == Scalar("bool")
     assert [m.name for m in parse_parts("int32 a\n---\n---\nint32 b", "p/Go", "action")] == [
         "p/Go_Goal",
         "p/Go_Result",
         "p/Go_Feedback",
+        "p/Go_SendGoal_Request",
         "p/Go_SendGoal_Response",
+        "p/Go_GetResult_Request",
         "p/Go_GetResult_Response",
+        "p/Go_FeedbackMessage",
     ]
     with pytest.raises(WrongDefinition, match="2 parts"):
         parse_parts("int32 a", "p/Do", "srv")

@@ -160,6 +160,7 @@ def test_a_bag_and_a_graph(form: str, tmp_path: Path) -> None:
     [
         ((), []),
         (("/geiger/rate", "/geiger/ratte"), ["/geiger/rate is in the bag, and no node of the graph has it", "/ratte`"]),
+        (("/geiger/rate", "/other"), ["/geiger/rate is in the bag, and no node of the graph has it\n"]),
         (("Float64", "Float32"), ["/geiger/rate has the type std_msgs/Float64 in the bag, and std_msgs/Float32"]),
     ],
 )
@@ -169,8 +170,17 @@ def test_where_bag_and_graph_disagree_is_reported(edits: tuple[str, ...], wanted
     options = ("--from-bag", str(bag), "--from-graph", str(tmp_path / "graph.txt"))
     done = CliRunner().invoke(init, [str(tmp_path / "w"), *options], catch_exceptions=False)
     assert done.exit_code == 0
-    assert done.stderr.count("warning: ") == bool(wanted)
+    assert done.stderr.count("warning: ") == bool(wanted) + 1  # /odd has a type that nothing defines
+    assert "of the same robot?" not in done.stderr
     assert [text for text in wanted if text not in done.stderr] == []
+
+
+def test_the_graph_of_another_robot_is_doubted(tmp_path: Path) -> None:
+    (tmp_path / "graph.txt").write_text("/base\n  Publishers:\n    /rote: std_msgs/msg/Float64\n", encoding="utf-8")
+    options = ("--from-bag", str(make_bag(tmp_path / "run", "ros1")), "--from-graph", str(tmp_path / "graph.txt"))
+    done = CliRunner().invoke(init, [str(tmp_path / "w"), *options], catch_exceptions=False)
+    assert "the graph has none of the bag's topics: is it of the same robot?" in done.stderr
+    assert "did you mean" not in done.stderr
 
 
 def test_a_bag_without_definitions_wants_a_distribution(tmp_path: Path) -> None:
@@ -215,7 +225,7 @@ def test_a_bag_without_its_metadata_wants_it(form: str, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("form", "remedy"), [("sqlite3", "sqlite3"), ("mcap", "mcap recover"), ("ros1", "rosbag reindex")]
 )
-@pytest.mark.parametrize("share", [0, 0.01, 0.5, 0.99])
+@pytest.mark.parametrize("share", [0.01, 0.5, 0.99])
 def test_a_bag_that_was_cut_off_says_what_restores_it(form: str, remedy: str, share: float, tmp_path: Path) -> None:
     bag = make_bag(tmp_path / "run", form)
     file = bag if bag.is_file() else next(each for each in bag.iterdir() if each.suffix in (".db3", ".mcap"))
@@ -227,6 +237,19 @@ def test_a_bag_that_was_cut_off_says_what_restores_it(form: str, remedy: str, sh
     assert f"`{remedy} {file}" in (fault.hint or "")
 
 
+@pytest.mark.parametrize("form", ["sqlite3", "mcap", "ros1"])
+@pytest.mark.parametrize("text", ["", "hello"])
+def test_what_never_was_a_bag_is_not_restored(form: str, text: str, tmp_path: Path) -> None:
+    bag = make_bag(tmp_path / "run", form)
+    file = bag if bag.is_file() else next(each for each in bag.iterdir() if each.suffix in (".db3", ".mcap"))
+    file.write_text(text, encoding="utf-8")
+    (tmp_path / "empty").mkdir()
+    for path, hint in ((bag, "file by its first bytes: copy the bag again"), (tmp_path / "empty", "copy the")):
+        with pytest.raises(Rejected) as caught:
+            CliRunner().invoke(init, [str(tmp_path / "w"), "--from-bag", str(path)], catch_exceptions=False)
+        assert hint in (caught.value.diagnostics[0].hint or "")
+
+
 @pytest.mark.parametrize("text", ["", "a -> b", "/a\n  Publishers:\n", '{"/a": {"publishers": {"/t\\nx": "a/B"}}}'])
 def test_what_is_no_graph_drafts_nothing(tmp_path: Path, text: str) -> None:
     (tmp_path / "graph.txt").write_text(text, encoding="utf-8")
@@ -234,7 +257,20 @@ def test_what_is_no_graph_drafts_nothing(tmp_path: Path, text: str) -> None:
     with pytest.raises(Rejected) as caught:
         CliRunner().invoke(init, [str(tmp_path / "w"), *options], catch_exceptions=False)
     assert [d.code for d in caught.value.diagnostics] == ["CLI011"]
+    if not text.startswith("{"):
+        assert "of each node" in f"{caught.value.diagnostics[0].message}{caught.value.diagnostics[0].hint}"
     assert not (tmp_path / "w").exists()
+
+
+def test_the_folder_to_go_to_is_quoted(tmp_path: Path) -> None:
+    assert f"  cd '{tmp_path}/my robot'\n" in CliRunner().invoke(init, [str(tmp_path / "my robot")]).output
+
+
+@pytest.mark.parametrize(("distro", "version"), [("noetic", "ros1"), ("humble", "ros2")])
+def test_a_graph_is_of_the_distributions_ros(distro: str, version: str, tmp_path: Path) -> None:
+    (tmp_path / "g.json").write_text('{"/n": {"publishers": {"/t": "std_msgs/Bool"}}}', encoding="utf-8")
+    folder = run(tmp_path / "w", "--from-graph", str(tmp_path / "g.json"), "--distro", distro)
+    assert f"ros_version: {version}" in (folder / "plan.yaml").read_text(encoding="utf-8")
 
 
 def test_names_of_a_graph_are_data(tmp_path: Path) -> None:
@@ -322,6 +358,19 @@ def test_services_and_actions_of_a_graph_are_drafted(tmp_path: Path, monkeypatch
     }
     assert "{by: call}" in (folder / "plan.yaml").read_text(encoding="utf-8")
     assert CliRunner().invoke(check, [str(folder)]).exit_code == 0
+    assert "not known: control/action/Spin.action, nobody/srv/Knows.srv; the topics" in done.stderr
+
+
+def test_own_messages_of_a_graph_are_given_by_their_folder(tmp_path: Path) -> None:
+    (tmp_path / "graph.txt").write_text(CALLS.replace("nobody/srv/Knows", "std_srvs/srv/SetBool"), encoding="utf-8")
+    own = tmp_path / "src/control/action/Spin.action"
+    own.parent.mkdir(parents=True)
+    own.write_text("float64 angle  # rad\n---\nbool done\n---\nfloat64 left\n", encoding="utf-8")
+    options = ("--from-graph", str(tmp_path / "graph.txt"), "--messages", str(tmp_path / "src"))
+    system = run(tmp_path / "w", *options, warned="PLAN123")
+    assert "control/Spin_Goal /spin matches(in.spin_goal)" in (system / "system.rcl").read_text(encoding="utf-8")
+    text = (system / "msg/control/action/Spin.action").read_text(encoding="utf-8")
+    assert text == "float64 angle\n---\nbool done\n---\nfloat64 left\n"
 
 
 def test_services_of_a_bag_are_drafted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -335,6 +384,7 @@ def test_services_of_a_bag_are_drafted(tmp_path: Path, monkeypatch: pytest.Monke
     text = (folder / "system.rcl").read_text(encoding="utf-8")
     assert "my_msgs/Go_Request /go matches(in." in text
     assert "my_msgs/Go_Response /go matches(out." in text
+    assert (folder / "msg/my_msgs/srv/Go.srv").read_text(encoding="utf-8") == GO
     assert CliRunner().invoke(check, [str(folder)]).exit_code == 0
 
 

@@ -142,7 +142,7 @@ def alike(system: System, batches: Iterator[Batch], events: list[Any]) -> tuple[
     assert fast.finish() == plain.finish()
     assert to_the_nanosecond(fast.tallies) == to_the_nanosecond(plain.tallies)
     assert (fast.events, fast.backwards, fast.values) == (plain.events, plain.backwards, plain.values)
-    assert fast.passages() == plain.passages()
+    assert fast.timing.passages == plain.timing.passages
     if plain.pairing is not None and fast.pairing is not None:
         assert {**fast.pairing.answered} == {**plain.pairing.answered}
     return len(got), fast.events - Counting.steps

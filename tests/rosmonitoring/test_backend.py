@@ -210,7 +210,9 @@ def test_a_message_without_the_field_that_pairs_answers_is_told(
         found = [d for d in BACKEND.check(job_for(system, "n")) if d.code == "MON103"]
         assert ["std_msgs/Float64 has no field 'header'" in d.message for d in found] == [True] * said
     system = make_system(text, fields, plan=more, traces=traces, answers=None)
-    found = [d for d in BACKEND.check(job_for(system, "n")) if "add `answers` to the method" in d.message]
+    found = [
+        d for d in BACKEND.check(job_for(system, "n")) if "add `answers: {by: stamp}`, or another way" in d.message
+    ]
     assert len(found) == 1
 
 
@@ -275,7 +277,7 @@ def test_a_recording_named_by_its_digest_need_not_be_here(make_system: Callable[
     job, file = job_for(system, "n"), system.plan.root / "run.jsonl"
     assert [d.code for d in BACKEND.check(job)] == ["MON107"]
     absent = discharge(system, "n", tmp_path)["low"]
-    assert (absent.verdict, "is not here" in absent.summary) == (Verdict.NOT_RUN, True)
+    assert (absent.verdict, "is not here: fetch it first, also in CI" in absent.summary) == (Verdict.NOT_RUN, True)
     file.write_text(line, encoding="utf-8")
     assert [d.code for d in BACKEND.check(job)] == ["MON107"]
     assert discharge(system, "n", tmp_path)["low"].verdict is Verdict.MONITORED

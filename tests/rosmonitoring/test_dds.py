@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import signal
 import socket
 import subprocess
 import sys
@@ -13,6 +14,7 @@ from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -33,6 +35,7 @@ from avow.system.plan import System
 
 from .processes import LONGEST, MAPPING, RCL, running
 from .test_bags import write_bag
+from .test_calls import PLAN, make, spinning
 
 needs_dds = pytest.mark.needs_dds
 HERE = Path(__file__).parent
@@ -53,6 +56,11 @@ class Peer:
 
     def write(self, topic: str, kind: str = "Double", qos: tuple[str, ...] = ("reliable",), name: str = "") -> None:
         self("write", name=name or topic, topic=f"rt/{topic}", kind=kind, qos=list(qos))
+
+    def calls(self, service: str, asked: str, told: str) -> None:
+        """Writers of a service's requests and responses."""
+        self("write", name="asked", topic=f"rq/{service}Request", kind=asked, qos=["reliable"])
+        self("write", name="told", topic=f"rr/{service}Reply", kind=told, qos=["reliable"])
 
     def say(self, topic: str, *values: Any, **more: Any) -> None:
         self("say", name=topic, values=list(values), **more)
@@ -77,6 +85,13 @@ def peer() -> Iterator[Peer]:
     command = [sys.executable, HERE / "dds_peer.py", domain]
     with running(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as process:
         yield Peer(process, domain)
+
+
+def running_of(system: System, record: Path) -> Session:
+    """The session that has judged a record."""
+    judged = session(system)
+    list(judged.run(record))
+    return judged
 
 
 class Listening:
@@ -194,6 +209,187 @@ def test_two_writers_one_that_goes_and_one_that_comes_late(peer: Peer, make_syst
 
 @pytest.mark.slow
 @needs_dds
+def test_calls_are_heard_as_in_bags(peer: Peer, tmp_path: Path) -> None:
+    """Each response is judged by its own request, though two clients number theirs alike; a client may be gone."""
+    system, record = make(tmp_path), tmp_path / "run.jsonl"
+    peer.calls("go", "GoRequest", "GoResponse")
+    with Listening(peer, system, record) as listening:
+        peer.heard("asked"), peer.heard("told")
+
+        def say(name: str, count: int, *call: Any) -> None:
+            peer.say(name, call)
+            listening.until(lambda s: s.events == count)
+
+        say("asked", 1, 7, 1, 1.0)
+        say("asked", 2, 8, 1, 5.0)
+        say("told", 3, 7, 1, True, "x")
+        peer("gone", name="asked")
+        listening.told("/go/_request: no writer is left")
+        say("told", 5, 8, 1, False, "x")
+        peer.calls("go", "GoRequest", "GoResponse")
+        peer.heard("asked")
+        say("asked", 6, 9, 1, 9.0)
+        say("told", 7, 9, 1, True, "x")
+    for judged in (listening.session, running_of(system, record)):
+        (tally,) = (tally for _, name, _, tally in judged.clauses() if name == "limits")
+        assert (tally.judged, tally.undecided, tally.broken, tally.unanswered) == (3, 0, 1, 0)
+        assert "server.limits" not in judged.unmonitored()
+    assert [(v.clause, v.index) for v in listening.found] == [("limits", 7)]
+
+
+@pytest.mark.slow
+@needs_dds
+def test_actions_are_heard_as_in_bags(peer: Peer, tmp_path: Path) -> None:
+    system, record = spinning(tmp_path), tmp_path / "run.jsonl"
+    peer("write", name="sent", topic="rq/spin/_action/send_goalRequest", kind="SendGoal", qos=["reliable"])
+    peer.calls("spin/_action/get_result", "GetResult", "GotResult")
+    peer.write("spin/_action/feedback", "FeedbackMessage")
+    said = [
+        ("sent", (7, 1, ("uuid", 1), ("goal", 2.0))),
+        ("sent", (7, 2, ("uuid", 2), ("goal", 5.0))),
+        ("asked", (7, 1, ("uuid", 1))),
+        ("asked", (7, 2, ("uuid", 2))),
+        ("spin/_action/feedback", (("uuid", 1), ("feedback", 1.0))),
+        ("told", (7, 2, 4, ("result", 5.0))),
+        ("told", (7, 1, 4, ("result", 3.0))),
+        ("spin/_action/feedback", (("uuid", 2), ("feedback", -1.0))),
+    ]
+    with Listening(peer, system, record) as listening:
+        for name in ("sent", "asked", "told", "spin/_action/feedback"):
+            peer.heard(name)
+        for k, (name, value) in enumerate(said, start=1):
+            peer.say(name, value)
+            listening.until(lambda s, k=k: s.events == k)  # type: ignore[misc]
+    assert [(v.clause, v.index) for v in listening.found] == [("all_done", 7), ("forward", 8)]
+    again = session(system)
+    assert [(v.clause, v.index) for _, v in again.run(record)] == [("all_done", 7), ("forward", 8)]
+    assert again.unmonitored() == {}
+
+
+@pytest.mark.slow
+@needs_dds
+def test_the_clients_view_of_calls_is_heard_as_events(peer: Peer, tmp_path: Path) -> None:
+    """With introspection, whichever the vendor; the server's events are parts of other topics."""
+    mapping = "{in.speed: {topic: /go/_request_sent, field: speed}, out.ok: {topic: /go/_response_received, field: ok}}"
+    system = make(tmp_path, PLAN.replace("answers:", f"mapping: {mapping}, answers:"))
+    record = tmp_path / "run.jsonl"
+    peer.write("go/_service_event", "GoEvent")
+    events = [(0, 1, [5.0], []), (1, 1, [5.0], []), (2, 1, [], [False]), (3, 1, [], [True])]
+    with Listening(peer, system, record) as listening:
+        peer.heard("go/_service_event")
+        peer.say("go/_service_event", *events)
+        listening.until(lambda s: s.events == 4)
+        peer("gone", name="go/_service_event")
+        listening.told("/go/_request_sent: no writer is left"), listening.told("/go/_response_received: no writer")
+    assert [(v.clause, v.index) for v in listening.found] == [("limits", 4)]
+    assert [(v.clause, v.index) for _, v in session(system, ("server",)).run(record)] == [("limits", 4)]
+
+
+@pytest.mark.slow
+@needs_dds
+def test_calls_that_nothing_names_are_told_and_not_heard(
+    peer: Peer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Other vendors identify a call outside of the sample."""
+    monkeypatch.setattr(dds, "_CYCLONE", b"\x01\x0f")
+    peer.calls("go", "GoRequest", "GoResponse")
+    with Listening(peer, make(tmp_path)) as listening:
+        peer.heard("asked")
+        peer.say("asked", (7, 1, 1.0))
+        listening.told("nothing names its calls")
+    assert "it is not written by Cyclone DDS" in listening.session.unmonitored()["server.limits"]
+    assert all("/_re" in one for one in listening.warned)
+
+
+def unheard(record: Path) -> list[tuple[str, str]]:
+    """The marks of a record, each with its reason."""
+    events = [json.loads(line) for line in record.read_text("utf-8").splitlines()]
+    return [(mark, event[mark]) for event in events for mark in ("_lost", "_gone") if mark in event]
+
+
+@pytest.mark.slow
+@needs_dds
+def test_lost_samples_are_in_the_record(
+    peer: Peer, make_system: Callable[..., System], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Cyclone DDS itself counts hardly any."""
+    from cyclonedds.sub import DataReader
+
+    system, record = make_system(RCL, MAPPING), tmp_path / "run.jsonl"
+    peer.write("s")
+    with Listening(peer, system, record) as listening:
+        peer.heard("s")
+        peer.say("s", 1.0)
+        listening.until(lambda s: s.events == 1)
+        monkeypatch.setattr(DataReader, "get_sample_lost_status", lambda reader: SimpleNamespace(total_count=3))
+        peer.say("s", 2.0)
+        listening.until(lambda s: s.events == 3)
+    assert unheard(record) == [("_lost", "s: 3 samples lost")]
+    for judged in (listening.session, running_of(system, record)):
+        assert judged.unmonitored() == {"n.low": "not all was heard: s: 3 samples lost"}
+
+
+@pytest.mark.slow
+@needs_dds
+def test_the_last_writer_that_goes_is_in_the_record(
+    peer: Peer, make_system: Callable[..., System], tmp_path: Path
+) -> None:
+    system, record = make_system(RCL, MAPPING), tmp_path / "run.jsonl"
+    peer.write("s")
+    with Listening(peer, system, record) as listening:
+        peer.heard("s")
+        peer.say("s", 1.0, 2.0)
+        peer("gone", name="s")
+        listening.told("s: no writer is left")
+    assert unheard(record) == [("_gone", "s: no writer is left")]
+    judged = running_of(system, record)
+    assert (judged.unmonitored(), judged.monitors[0].values) == ({}, {})
+
+
+@pytest.mark.slow
+@needs_dds
+def test_a_writer_out_of_reach_for_a_while_is_in_the_record(
+    peer: Peer, make_system: Callable[..., System], tmp_path: Path
+) -> None:
+    system, record = make_system(RCL, MAPPING), tmp_path / "run.jsonl"
+    peer.write("s")
+    with Listening(peer, system, record) as listening:
+        peer.heard("s")
+        peer.say("s", 1.0)
+        listening.until(lambda s: s.events == 1)
+        peer.process.send_signal(signal.SIGSTOP)
+        listening.told("s: no writer is left")
+        peer.process.send_signal(signal.SIGCONT)
+        listening.told("was out of reach")
+        peer.heard("s")
+        peer.say("s", 2.0)
+        listening.until(lambda s: s.events == 4)
+    assert [mark for mark, _ in unheard(record)] == ["_gone", "_lost"]
+    assert "n.low" in running_of(system, record).unmonitored()
+
+
+@pytest.mark.slow
+@needs_dds
+def test_a_writer_that_comes_and_goes_at_once_is_heard(
+    peer: Peer, make_system: Callable[..., System], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    peer.write("s")
+    with Listening(peer, make_system(RCL, MAPPING)) as listening:
+        peer.heard("s")
+        peer.say("s", 1.0)
+        listening.until(lambda s: s.events == 1)
+        monkeypatch.setattr(dds, "DDS_SETTLE", 5.0)
+        peer.say("s", 2.0)  # a round begins
+        peer.write("s", name="short")
+        peer.heard("short")
+        peer.say("short", 200.0)
+        peer("gone", name="short")
+        listening.until(lambda s: s.events == 3)
+    assert [(v.clause, v.index) for v in listening.found] == [("low", 3)]
+
+
+@pytest.mark.slow
+@needs_dds
 def test_nothing_is_lost_of_a_burst(peer: Peer, make_system: Callable[..., System]) -> None:
     peer.write("s")
     with Listening(peer, make_system(RCL, MAPPING)) as listening:
@@ -212,7 +408,7 @@ def test_a_writer_that_was_heard_can_be_heard_whatever_discovery_says(
     from cyclonedds.sub import DataReader
 
     monkeypatch.setattr(dds, "DDS_MATCH", 3.0)
-    monkeypatch.setattr(DataReader, "get_matched_publications", lambda reader: [])
+    monkeypatch.setattr(DataReader, "get_matched_publication_data", lambda reader, writer: None)
     peer.write("s")
     with Listening(peer, make_system(RCL, MAPPING)) as listening:
         peer.heard("s")
@@ -251,7 +447,11 @@ def test_a_writer_whose_clock_jumps_is_no_false_alarm(peer: Peer, make_system: C
 @needs_dds
 @pytest.mark.parametrize(
     ("kind", "told"),
-    [("Wrong", "is made otherwise"), ("Short", "is made otherwise"), ("Single", "is written as std_msgs/Float32")],
+    [
+        ("Wrong", "is made otherwise"),
+        ("Short", "is made otherwise"),
+        ("Single", "s: it is written as std_msgs/Float32"),
+    ],
 )
 def test_another_layout_or_type_is_told_and_not_heard(
     peer: Peer, make_system: Callable[..., System], monkeypatch: pytest.MonkeyPatch, kind: str, told: str
@@ -261,7 +461,8 @@ def test_another_layout_or_type_is_told_and_not_heard(
     with Listening(peer, make_system(RCL, MAPPING)) as listening:
         peer.say("s", 1)
         listening.told(told)
-    assert listening.session.events == 0
+    assert listening.session.unmonitored()["n.low"].startswith("not all was heard")
+    assert listening.session.summary()["nodes"][0]["relevant"] == 0
 
 
 @pytest.mark.slow

@@ -20,8 +20,8 @@ from xmlrpc.server import SimpleXMLRPCServer
 import pytest
 from helpers import wait_for
 
-from avow.backends.rosmonitoring.live import ros1
-from avow.backends.rosmonitoring.live.follow import follow, graph_of
+from avow.backends.rosmonitoring.live import graphs, ros1
+from avow.backends.rosmonitoring.live.follow import Board, follow, graph_of
 from avow.backends.rosmonitoring.live.ros1 import Ros1, frame, header, master_of, read_header, reader
 from avow.backends.rosmonitoring.session import Session, session
 from avow.backends.rosmonitoring.watched import Fault, Violation
@@ -87,6 +87,10 @@ def until(done: Callable[[], bool], seconds: float = 60.0) -> Callable[[], bool]
     return lambda: done() or time.monotonic() >= end
 
 
+SAID_BY = {"ros": {"nodes": {"n": {"name": ros1.CALLER}}}}
+"""The name under which a test speaks."""
+
+
 def heard(
     master: Master, system: System, say: Callable[[Any], None], over: Callable[[Session], bool], record: Path
 ) -> tuple[list[Violation], list[str]]:
@@ -114,7 +118,7 @@ def test_what_a_graph_says_is_judged_and_recorded(
             spoken.say(float64(value))
 
     record = tmp_path / "run.jsonl"
-    system = make_system(RCL, MAPPING)
+    system = make_system(RCL, MAPPING, plan=SAID_BY)
     found, warned = heard(master, system, say, lambda running: running.events == 4, record)
     assert [w.partition(":")[0] for w in warned] == ["the topics of a running graph have no common order"]
     assert [(v.clause, v.index) for v in found] == [("low", 3)]
@@ -165,7 +169,7 @@ def test_a_filter_passes_on_what_breaks_nothing(
     assert [(v.clause, v.fault) for v in found] == [("low", Fault.GUARANTEE), ("out.s", Fault.MAPPING)]
     assert running.withheld == {"/s": 2}
     topics = [json.loads(line)["topic"] for line in record.read_text("utf-8").splitlines()]
-    assert topics == ["/s_mon", "/s", "/s_mon", "/s_mon", "/s_mon", "/s"]
+    assert topics == ["/s_mon", "/s", "/s_mon", "/s_mon", "/s_mon", "/s", "/s"]  # the last was not heard
     again = session(system)
     assert list(again.run(record)) == []
     assert [*again.unmonitored()] == ["n.low"]
@@ -297,8 +301,36 @@ def test_a_publisher_that_is_not_ready_is_asked_again(master: Master, monkeypatc
         assert heard is not None
         assert heard.read is not None
         assert heard.read()["data"] == 1.5
+        spoken._lines.pop().shutdown(socket.SHUT_RDWR)
+        assert [heard and heard.mark for heard in (graph.inbox.get(60), graph.inbox.get(60))] == ["_gone", "_lost"]
         graph._publishers("", "/s", [])
         assert not graph._heard
+
+
+def test_a_verdict_over_unheard_messages_is_a_warning(make_system: Callable[..., System]) -> None:
+    running = session(make_system(RCL, MAPPING))
+    silent: Any = SimpleNamespace(diagnostics=lambda topic, system: lambda statuses: None)
+    board = Board(running, silent, "/verdicts")
+    levels = []
+    for more in ({"data": 1.0}, {"_lost": "3 samples"}, {"data": 2.0}):
+        list(running.step({"topic": "s", "time": 0, **more}))
+        levels.append([(status.level, status.text) for status in board.standing()])
+    assert [level for ((level, _),) in levels] == [graphs.OK, graphs.WARN, graphs.WARN]
+    assert levels[2] == [(graphs.WARN, "not all was heard: 3 samples")]
+
+
+def test_messages_without_room_are_marked_where_they_are_missing(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(graphs, "QUEUED_MESSAGES", 2)
+    inbox = graphs.Inbox()
+    for topic in "rrrrs":
+        inbox.message(topic, lambda now: {"time": now})
+    heard = [one for _ in range(4) if (one := inbox.get(0)) is not None]
+    inbox.message("r", lambda now: {"time": now})
+    heard += [one for _ in range(2) if (one := inbox.get(0)) is not None]
+    assert [(one.topic, one.read is None) for one in heard] == [
+        ("r", False), ("r", False), ("r", True), ("s", True), ("r", False),
+    ]  # fmt: skip
+    assert {one.mark for one in heard if one.read is None} == {"_lost"}
 
 
 @pytest.mark.parametrize("text", ["rosbridge:ws://127.0.0.1:9090", "zenoh"])
@@ -312,7 +344,7 @@ def test_calls_are_not_heard_on_a_running_graph(make_system: Callable[..., Syste
     running = session(make_system(rcl.replace("r : REAL", "r : BOOL"), MAPPING))
     told = graph_of("ros1:http://127.0.0.1:1", running, "127.0.0.1").inbox.get(0)
     assert told is not None
-    assert told.trouble == "/grip/_request: calls of services and actions are not heard on a running graph"
+    assert told.trouble == "/grip/_request is not heard on a running ros1 graph"
 
 
 NODE = """
@@ -369,5 +401,5 @@ def test_a_real_master_and_a_rospy_node(make_system: Callable[..., System], tmp_
             out, wrong = monitor.communicate()
     assert monitor.returncode == 1, out + wrong
     found = json.loads(out)
-    assert found["events"] == 400
+    assert found["nodes"][0]["relevant"] == 400
     assert [v["event"] for v in found["violations"]] == [51, 151, 251, 351]

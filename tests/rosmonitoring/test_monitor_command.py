@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import subprocess
 import threading
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,8 @@ from avow.backends.rosmonitoring.live.serve import answer, serve
 from avow.backends.rosmonitoring.session import session
 from avow.system.plan import System
 from rosmonitoring.conftest import CASE
+
+from .test_pace import MAPPING, RCL
 
 
 def monitor(*arguments: str, stdin: str = "") -> subprocess.CompletedProcess[str]:
@@ -126,6 +129,7 @@ def test_a_trace_of_other_topics_is_no_success(case_folder: Path, traces: dict[s
 def test_usage(case_folder: Path) -> None:
     assert monitor(str(case_folder)).returncode == 2
     assert monitor(str(case_folder), "x", "--serve", "0").returncode == 2
+    assert "give one: TRACE, --live" in monitor(str(case_folder), "x", "--live", "ros2").stderr
     assert "need --live" in monitor(str(case_folder), "x", "--for", "2").stderr
 
 
@@ -136,10 +140,25 @@ def test_replies_always_carry_a_verdict_and_never_a_final_one(case: System, nomi
     frames += ["", "nonsense", "[]", "[" * 100_000, '{"topic": "radiationStatus", "level": "green"', "{}"]
     for frame in frames:
         reply = json.loads(answer(running, frame))
-        assert reply["verdict"] in ("currently_true", "currently_false")
+        assert reply["verdict"] in ("currently_true", "currently_false", "unknown")
     first = json.loads(answer(session(case), frames[0]))
     assert first.pop("verdict") == "currently_true"
     assert first == nominal[0]
+
+
+def test_an_event_by_which_nothing_is_decided_is_unknown(make_system: Callable[..., System]) -> None:
+    """Also the first answer after a reconnection, whose input the oracle has not heard."""
+    system = make_system(RCL, MAPPING)
+
+    def said(*events: tuple[str, float]) -> list[str]:
+        running = session(system)
+        frames = [json.dumps({"topic": topic, "time": k, "data": data}) for k, (topic, data) in enumerate(events)]
+        return [json.loads(answer(running, frame))["verdict"] for frame in frames]
+
+    assert said(("r", 1), ("s", 1), ("elsewhere", 1), ("s", 1), ("s", 2)) == [
+        "unknown", "currently_true", "unknown", "currently_true", "currently_false",
+    ]  # fmt: skip
+    assert said(("s", 2), ("r", 2), ("s", 2)) == ["unknown", "unknown", "currently_true"]
 
 
 def test_the_oracle_over_a_websocket(case: System, nominal: list[dict[str, Any]]) -> None:
@@ -165,7 +184,7 @@ def test_the_oracle_over_a_websocket(case: System, nominal: list[dict[str, Any]]
             assert len(verdicts) == len(nominal)
             at = next(k for k, e in enumerate(nominal) if e.get("level") == "red")
             assert verdicts.index("currently_false") == at
-            assert verdicts[:at] == ["currently_true"] * at
+            assert {*verdicts[:at]} == {"currently_true", "unknown"}
     finally:
         started[0].shutdown()
         thread.join(20)
@@ -182,3 +201,15 @@ def test_inputs_that_are_too_old_are_no_success(tmp_path: Path) -> None:
         events = [{"topic": "x", "time": 1.0, "data": 9.0}, {"topic": "y", "time": 1.0 + late, "data": True}]
         done = monitor(str(tmp_path), "-", stdin="".join(f"{json.dumps(event)}\n" for event in events))
         assert (done.returncode, "too old (`max_age`)" in done.stdout) == (code, code == 1), done.stdout
+
+
+def test_without_answers_what_held_is_no_evidence_and_no_success(tmp_path: Path) -> None:
+    (tmp_path / "system.rcl").write_text(
+        "node n { inputs( x : REAL ) outputs( y : BOOL ) topics( std_msgs/Float64 x matches(in.x), std_msgs/Bool y "
+        "matches(out.y) ) guarantee g ( in.x > 5 -> out.y ) guarantee alone ( out.y ) }"
+    )
+    (tmp_path / "plan.yaml").write_text("ros: {distro: humble}\nnodes: {n: {methods: [{rosmonitoring: {}}]}}\n")
+    events = [{"topic": "x", "time": 1.0, "data": 9.0}, {"topic": "y", "time": 1.1, "data": True}]
+    done = monitor(str(tmp_path), "-", stdin="".join(f"{json.dumps(event)}\n" for event in events))
+    assert (done.returncode, "unmonitored: n.g\n" in done.stdout) == (1, True)
+    assert "  n.g: the plan does not say which input an answer answered: add `answers: {latency: 10 ms, " in done.stdout

@@ -16,7 +16,7 @@ from avow.backends.rosmonitoring import BACKEND, options
 from avow.backends.rosmonitoring.command import _Output, _report
 from avow.backends.rosmonitoring.engine import Monitor
 from avow.backends.rosmonitoring.session import Session, session
-from avow.backends.rosmonitoring.watched import Fault, coverage
+from avow.backends.rosmonitoring.watched import DEPENDS, UNSAID, Fault, Tally, coverage, remedies
 from avow.base.diagnostics import Rejected
 from avow.base.verdict import Outcome, Verdict
 from avow.pipeline.plan_check import of_plan
@@ -118,11 +118,23 @@ def test_a_part_that_breaks_whatever_the_rest_was_is_broken(
     found = judged(make_system, tmp_path, TWO.format("or"), events(*WHOLE, *tail))
     assert found.verdict is Verdict.UNKNOWN
     assert "part of an incomplete answer 1" in found.summary
+    assert (
+        "decided; its outputs come on several topics, not always together: judge at each, `when: any`" in found.summary
+    )
     found = judged(make_system, tmp_path, TWO.format("or"), events(*WHOLE, *tail), decided=0.9)
     assert found.verdict is Verdict.MONITORED
     assert "part of an incomplete answer 1" in found.summary
     quiet = judged(make_system, tmp_path, TWO.format("and"), events(*WHOLE, ("r", 1.0), *tail))
     assert quiet.verdict is Verdict.MONITORED
+
+
+@pytest.mark.parametrize("first", [0, 1])
+def test_what_an_initial_value_does_not_mend_is_told_beside_it(first: int) -> None:
+    tally = Tally(published=9, judged=3)
+    for reason in (UNSAID, DEPENDS)[:: 1 if first else -1]:
+        tally.unsure(f"in.r{UNSAID}" if reason is UNSAID else reason)
+    told = remedies(tally, {}, {})
+    assert "mapping: {in.r: {…, initial: …}}; and pair answers by a stamp or a key" in told
 
 
 @pytest.mark.parametrize("fault", ["no stamp", "two inputs"])

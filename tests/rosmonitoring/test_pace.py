@@ -160,6 +160,53 @@ def test_losses_beyond_what_is_allowed_are_no_evidence(make_system: Callable[...
     assert "have no numbers" in evidence(make_system, events, losses=1).summary
 
 
+@pytest.mark.parametrize("answers", [{}, {"answers": {"by": "key", "input": "k", "output": "k"}}])
+@pytest.mark.parametrize(
+    ("mark", "topic", "time", "verdict", "words"),
+    [
+        ("_lost", "r", 2.55, Verdict.UNKNOWN, "not all was heard: 3 samples lost"),
+        ("_lost", "s", 9.0, Verdict.UNKNOWN, "not all was heard: 3 samples lost"),
+        ("_lost", "other", 2.55, Verdict.MONITORED, "held"),
+        ("_gone", "r", 9.0, Verdict.MONITORED, "held"),
+    ],
+)
+def test_messages_that_were_not_heard_are_no_evidence(
+    mark: str, topic: str, time: float, verdict: Verdict, words: str, answers: dict[str, Any],
+    make_system: Callable[..., System], tmp_path: Path,
+) -> None:  # fmt: skip
+    """However many messages came before and after, in the order of which the batch is judged."""
+    events = [{**e, "k": k // 2} for k, e in enumerate(merged(ticks("r", 0, 9, 0.1), ticks("s", 0.01, 9, 0.1)))]
+    at = sum(event["time"] < time for event in events)
+    events.insert(at, {"topic": topic, "time": time, mark: "3 samples lost"})
+    found = evidence(make_system, events, **answers)
+    assert (found.verdict, words in found.summary) == (verdict, True), found.summary
+    (tmp_path / "t.jsonl").write_text("".join(json.dumps(event) + "\n" for event in events), encoding="utf-8")
+    running = session(make_system(RCL, MAPPING, **answers))
+    assert list(running.run(tmp_path / "t.jsonl")) == []
+    assert ("n.copies" in running.unmonitored()) is (verdict is Verdict.UNKNOWN)
+
+
+def test_values_are_unknown_once_nobody_publishes_them(make_system: Callable[..., System]) -> None:
+    """The node goes on answering, and nothing says what."""
+    events = merged(ticks("r", 0, 3, 0.1), ticks("s", 0.01, 4, 0.1))
+    assert evidence(make_system, events).verdict is Verdict.MONITORED
+    at = sum(event["time"] < 3 for event in events)
+    gone = {"topic": "r", "time": 2.99, "_gone": "no writer of r is left"}
+    found = evidence(make_system, [*events[:at], gone, *events[at:]])
+    assert found.verdict is Verdict.UNKNOWN
+    assert "30 of 40 publications were decided" in found.summary
+
+
+def test_a_step_that_was_not_heard_is_no_step_before(make_system: Callable[..., System], tmp_path: Path) -> None:
+    rcl = RCL.replace("out.s == in.r", "out.s <= previous(out.s, 9) + 1")
+    path, events = tmp_path / "t.jsonl", list(ticks("s", 0, 1, 0.1))
+    for k, event in enumerate(events):
+        event["data"] = 1.0 if k < 5 else 3.0
+    for more, count in (([], 1), ([{"topic": "s", "time": 0.45, "_lost": "some"}], 0)):
+        path.write_text("".join(json.dumps(event) + "\n" for event in [*events[:5], *more, *events[5:]]), "utf-8")
+        assert len([*session(make_system(rcl, MAPPING)).run(path)]) == count
+
+
 @pytest.mark.parametrize(
     ("numbers", "words"),
     [

@@ -153,6 +153,16 @@ def test_each_fault_alone_is_told_once(name: str, tmp_path: Path) -> None:
     assert alike(found, expected([name])), found
 
 
+@pytest.mark.parametrize("others", ["latency: 3, because: measured", "latency: 3 ms, because: …"])
+def test_the_rest_of_a_faulty_option_is_not_read_as_if_it_were_whole(others: str, tmp_path: Path) -> None:
+    """Without `others`, an input's `initial` would have no effect."""
+    mapping = "mapping: {in.raw: {field: degrees, initial: 1}, out.temperature: data}"
+    answers = f"answers: {{by: call, others: {{{others}, jitter: 1 ms}}}}"
+    plan = place(tmp_path, []) / "plan.yaml"
+    plan.write_text(PLAN.replace("mapping: {in.raw: degrees, out.temperature: data}", f"{mapping}, {answers}"))
+    assert check(tmp_path) == [("plan.yaml", "PLAN105")]
+
+
 @pytest.mark.parametrize("seed", some(range(12), 6, slow=6))
 def test_of_any_faults_all_are_told_and_nothing_else(seed: int, tmp_path: Path) -> None:
     chosen = Random(seed).sample(list(FAULTS), 4)
@@ -166,13 +176,14 @@ def test_of_any_faults_all_are_told_and_nothing_else(seed: int, tmp_path: Path) 
         ("node thermostat {", "node thermo-stat {", "RCL113"),
         ("node thermostat {", "node thermometer {", "RCL219"),
         (CONTRACT, "", "RCL001"),
+        ("Low = 18;", "Low = 18; // \udcff", "RCL004"),
     ],
 )
 def test_what_a_lost_declaration_takes_along_is_no_fault_of_the_plan(
     old: str, new: str, code: str, tmp_path: Path
 ) -> None:
     folder = place(tmp_path, [])
-    (folder / "system.rcl").write_text(CONTRACT.replace(old, new))
+    (folder / "system.rcl").write_text(CONTRACT.replace(old, new), errors="surrogateescape")
     assert {told for _, told in check(folder)} == {code}
 
 
@@ -237,6 +248,7 @@ def test_a_plan_that_is_no_yaml_keeps_no_fault_of_the_contract_back(tmp_path: Pa
         ("nodes:\n     - a: {}\n    - b: {}\n", "this line is indented as none above it", 3),
         ('system: "home\n', "a quotation mark or a bracket is not closed", 1),
         ("system: home\n nodes: {}\n", "a `:` stands where no key can be", 2),
+        ("system: home\nnodes: [\n", "a quotation mark or a bracket is not closed", 3),
     ],
 )
 def test_what_is_no_yaml_is_told_in_words(text: str, said: str, line: int, tmp_path: Path) -> None:
@@ -249,6 +261,7 @@ def test_what_is_no_yaml_is_told_in_words(text: str, said: str, line: int, tmp_p
     assert not re.search(r"token|scalar|flow|block|stream", fault.message)
     assert fault.span is not None
     assert fault.span.line == line
+    assert "no key can be" not in fault.message or "the space after each `:`" in (fault.hint or "")
     assert "indent" not in fault.message or "this line, or those above" in (fault.hint or "")
 
 

@@ -77,16 +77,19 @@ def test_faults_are_located(tmp_path: Path, name: str, text: str, code: str, lin
         load(tmp_path, name, text)
     found = [(d.code, d.span.line if d.span else 0, d.message) for d in rejected.value.diagnostics]
     assert any((c, at) == (code, line) and words in message for c, at, message in found), found
+    hints = [d.hint or "" for d in rejected.value.diagnostics if words == "empty"]
+    assert [hint.partition(",")[0] for hint in hints] == ["its first line has headings: id"] * (words == "empty")
 
 
 def test_a_missing_file_and_a_path_outside_are_located(tmp_path: Path) -> None:
     load(tmp_path, "h.yaml", YAML)
-    for name, code in (("other.yaml", "PLAN107"), ("../h.yaml", "PLAN108")):
+    for name, code in (("other.yaml", "PLAN107"), ("unsafe.yaml", "PLAN107"), ("../h.yaml", "PLAN108")):
         (tmp_path / "plan.yaml").write_text(PLAN.format(name))
         with pytest.raises(Rejected) as rejected:
             load_system(tmp_path)
         (fault,) = rejected.value.diagnostics
         assert (fault.code, fault.span.line if fault.span else 0) == (code, 2)
+        assert name != "unsafe.yaml" or fault.hint is None, "plan.yaml has little but its ending in common"
 
 
 G = guarantee("n", "g")

@@ -85,6 +85,7 @@ def test_what_does_not_agree_is_told(tmp_path: Path, plan: str, launch: str, cod
     assert [d.code for d in found] == codes
     assert all(d.span is not None for d in found)
     assert all(d.notes for d in found if d.code == "ROS122"), "the launch file's line"
+    assert all(d.hint for d in found if d.code == "ROS122" and "remap" in d.message)
     printed = avow("check", "contracts/s", cwd=tmp_path).stdout
     assert re.findall(r"^\w+\[(ROS12[023])\]", printed, re.MULTILINE) == codes, "each once, and nothing that follows"
 
@@ -102,6 +103,17 @@ def test_what_does_not_agree_is_told(tmp_path: Path, plan: str, launch: str, cod
             ],
         ),
         ('<launch><node name="a" pkg="p" type="a"/></launch>', ["no launch file starts b", "a runs as /a"]),
+        (
+            APART.replace('"u"', '"v"'),
+            [
+                "a runs as /left/a",
+                "b runs as /b, with v → /left/t (not in the contract)",
+            ],
+        ),
+        (
+            APART.replace('"u"', '"u2"'),
+            ["a runs as /left/a", "b runs as /b, with u2 → /left/t (not in the contract)"],
+        ),
     ],
 )
 def test_check_says_how_each_node_runs(tmp_path: Path, launch: str, expected: list[str]) -> None:
@@ -316,6 +328,9 @@ def test_a_contract_drafted_of_what_runs_has_the_names_after_remapping(tmp_path:
     found = [d for d in diagnostics(load_system(misspelt)) if d.code == "ROS116"]
     assert found, "the remapping touches no topic"
     assert all(d.span and "launch" in d.span.file for d in found)
+    for name, hints in (("v", ["did you mean `/u`?"]), ("u2", [])):
+        slip = make(tmp_path / name, LAUNCH, APART.replace('"u"', f'"{name}"'))
+        assert [d.hint for d in diagnostics(load_system(slip)) if d.code == "ROS116"] == hints
 
 
 def test_memory_needs_no_topic(tmp_path: Path) -> None:

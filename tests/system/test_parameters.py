@@ -116,6 +116,7 @@ def test_values_come_from_plan_file_and_launch(tmp_path: Path, plan: str, limit:
         ("nodes: {brake: {parameters: {limit: true}}}", "is of type REAL", 1),
         ("nodes: {brake: {parameters: {mode: medium}}}", "is of type Mode", 1),
         ("nodes: {brake: {parameters: {limt: 0.2}}}", "no parameter 'limt'", 1),
+        ("nodes: {brake: {parameters: {limt: 0.2}, source: {cpp: brake.hpp}}}", "no parameter 'limt'", 1),
         (
             f"{STARTED}\nnodes: {{brake: {{parameters: {{limit: 0.3}}}}}}",
             "the plan sets it to 0.3; b.launch:1 sets it to 0.2",

@@ -62,6 +62,7 @@ def test_a_check_of_values_speaks_where_it_should(tmp_path: Path, good: str, wro
     (fault,) = read_plan(plan)[2]
     assert fault.code == code
     assert said in fault.message
+    assert (fault.hint or "").startswith("copy what it names into a") is ("leads out" in said)
     assert fault.span is not None
     assert fault.span.file == str(plan)
 

@@ -60,8 +60,8 @@ def test_scalars_are_never_guessed(text: str, value: object) -> None:
         ("system: a\nsystem: b\n", 2, 1, "given twice"),
         ("system: a\n\ttitle: b\n", 2, 1, "a tab stands where YAML wants spaces"),
         ("titel: x\n", 1, 1, "unknown key 'titel'"),
-        ("system: [a]\n", 1, 9, "text is wanted"),
-        ("system: 'a/../b'\n", 1, 9, "right form"),
+        ("system: [a]\n", 1, 9, "first a letter is wanted, not"),
+        ("system: 'a/../b'\n", 1, 9, "right form (expected: a name of letters, digits, `_` and `-`, first a letter)"),
         ('system: "a\\n"\n', 1, 9, "right form"),
         ("connections:\n  - {from: a.x, to: b.x, delayed: yes}\n", 2, 35, "true or false is wanted"),
         ("connections:\n  - {from: a, to: b.x}\n", 2, 12, "node.port"),
@@ -422,4 +422,4 @@ def test_a_right_shape_is_found_once(tmp_path: Path, monkeypatch: pytest.MonkeyP
         found = check_shape(piece, shelf)
         shelf.keep()
         assert len(asked) == times, text
-        assert found == real(piece, plan_schema(), "the plan")
+        assert found == real(piece.located(), plan_schema(), "the plan")

@@ -78,6 +78,11 @@ def test_that_an_input_does_not_change_has_words_of_its_own(tmp_path: Path) -> N
         assert len(silent) == sum(not words for _, words in wanted)
     gone = make(tmp_path / "gone", A, entry.format(f"until: 2020-02-02, {assumed.format(own)}"))
     assert [d.message for d in expired(gone)] == ["environment.a.r has expired: its last day was 2020-02-02"]
+    known = (
+        "{obligation: a/sanity/realizable, verdict: refuted, reason: b, who: A, date: 2020-01-01, expires: 2020-02-02}"
+    )
+    (found,) = expired(make(tmp_path / "known", A, f"accepted: [{known}]"))
+    assert found.message == "accepted a/sanity/realizable has expired: its last day was 2020-02-02"
     late = "compose: {whole: {one_output: {because: b, until: 2020-02-02}}}"
     (found,) = expired(make(tmp_path / "late", A, late))
     assert (found.code, found.span and found.span.column) == ("PLAN138", late.index("2020") + 1)

@@ -436,7 +436,7 @@ def test_every_ros_node_is_accounted_for(tmp_path: Path) -> None:
     assert told is not None
     messages = " / ".join(finding.message for finding in told.findings)
     assert "'listner' is not on the ROS graph" in messages
-    assert "listener are neither dropped" in messages
+    assert "nor part of a node of the model: listener" in messages
     assert "brain is not on the ROS graph" in messages
     unlinked = make(
         tmp_path, node("a", "", "q : REAL") + node("b", "x : REAL", "") + node("brain", "", "z : REAL"), plan % "rviz"

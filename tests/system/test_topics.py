@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from avow.base.diagnostics import Rejected
+from avow.pipeline.plan_check import of_plan
 from avow.system.graph import dataflow
 from avow.system.load import load_system
 from avow.system.plan import System
@@ -189,6 +190,18 @@ def test_a_listener_of_several_publishers_hears_any_of_them(tmp_path: Path) -> N
     (clause,) = system.contract.node("topic_cmd").guarantees
     assert clause.text == "out.u == in.joy_v or out.u == in.auto_w"
     assert system.contract.node("topic_cmd").assumptions == ()
+
+
+def test_a_node_that_publishes_what_it_hears_beside_another_is_told_in_the_names_of_the_files(tmp_path: Path) -> None:
+    """The advice starts the system; the note names both publishers."""
+    text = node("tank", "", "level : REAL", "float64 level matches(out.level)")
+    text += node("pump", "level : REAL", "p : REAL", "float64 level matches(in.level), float64 level matches(out.p)")
+    stuck, note = of_plan(make(tmp_path, text))
+    assert (stuck.code, stuck.message.partition(" wait")[0]) == ("PLAN123", "start-up deadlock: pump → pump")
+    assert note.message == "/level has several publishers, and an input on it takes what any says: tank, pump"
+    advice = (stuck.hint or "").partition("for example  ")[2]
+    assert advice == "connections: [{from: pump.p, to: pump.level, delayed: true, initial: …}]"
+    assert [d.code for d in of_plan(make(tmp_path, text, advice.replace("…", "0")))] == ["ROS117"]
 
 
 def test_relations_are_heard_whole(tmp_path: Path) -> None:

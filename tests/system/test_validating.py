@@ -69,10 +69,10 @@ def test_nobody_validates_what_is_not_there(
     assert code in capsys.readouterr().err
 
 
-GRAPH = """context { Most = 5; }
+GRAPH = """context { Most = 5; Level : {low, high}; }
 node a { inputs() outputs( x : REAL ) topics() guarantee low ( out.x <= Most ) }
 node c { inputs() outputs( x : REAL ) topics() guarantee any ( out.x <= 9 ) }
-node b { inputs( r : REAL ) outputs( x : REAL ) topics()
+node b { inputs( r : REAL, level : Level ) outputs( x : REAL ) topics()
   assume small "The reading is small" ( in.r <= 5 ) guarantee g ( out.x <= in.r ) }
 """
 PLAN = """connections: [{from: a.x, to: b.r}]
@@ -92,6 +92,7 @@ requirements: {R: {text: It is low., %s}}
          {"supported_by: [b.g]", "formula: b.x <= Most"}),
         (("outputs( x : REAL ) topics()\n  assume", "outputs( x : REAL in m ) topics()\n  assume"),
          {"supported_by: [b.g]", "formula: b.x <= Most"}),
+        (("low, high}", "low, high, top}"), {"supported_by: [b.g]", "formula: b.x <= Most"}),
         (("guarantee any ( out.x <= 9 )", "guarantee any ( out.x <= 8 )"), set()),
         (("node c", "// another node\nnode c"), set()),
     ],

@@ -14,8 +14,9 @@ from pathlib import Path
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.ros.bags import LIVE, Event
 from avow.ros.calls import is_part
-from avow.ros.dds import domain_of
+from avow.ros.dds import carriers, domain_of
 
+from ..answers import unheard
 from ..session import RAW, Session, filtered
 from ..tuning import LIVE_APART, LIVE_PAUSE, TOPICS_KEPT, VERDICTS_EVERY
 from ..watched import Violation, coverage
@@ -53,10 +54,10 @@ def follow(
             heard = graph.inbox.get(LIVE_PAUSE if ended is None else 0)
             if ended is not None and (heard is None or heard.time > ended):
                 break
-            event = None if heard is None else trouble.event(heard)
-            if event is not None:
+            if heard is not None:
+                event = trouble.event(heard)
                 lines = [event]
-                if heard is not None and heard.forward is not None:
+                if heard.forward is not None:
                     said = {**event, "topic": heard.topic.removesuffix(RAW)}
                     found, passed = running.offer(said)
                     if passed:
@@ -69,15 +70,13 @@ def follow(
                 if board is not None and found:
                     board.broken(found)
                 yield from found
-            elif heard is None and running.events:  # the run begins with its first message
+            elif running.events:  # the run begins with its first message
                 yield from running.tick({"time": time.time()})
             if board is not None:
                 board.refresh()
         yield from running.finish()
         if board is not None:
             board.say()
-        if graph.inbox.dropped:
-            warn(f"{graph.inbox.dropped} messages came faster than they were judged, and are lost")
 
 
 class Troubles:
@@ -87,11 +86,11 @@ class Troubles:
         self._warn = warn
         self._told: set[str] = set()
 
-    def event(self, heard: Heard) -> Event | None:
-        """The event of a message; an unreadable one has no fields, so that they are unknown."""
+    def event(self, heard: Heard) -> Event:
+        """The event of a message; an unreadable one has no fields, so that they are unknown. A trouble's has a mark."""
         if heard.read is None:
             self.tell(heard.trouble)
-            return None
+            return {"topic": heard.topic, "time": heard.time, LIVE: True, heard.mark: heard.trouble}
         try:
             return {**heard.read(), LIVE: True}
         except ValueError as error:
@@ -132,13 +131,14 @@ class Board:
         for monitor, clause, _, tally in self.running.clauses():
             name = f"{monitor.setup.node.name}.{clause}"
             latest = told.pop(name, None)
+            lost = unheard(monitor, clause)
             counts = (("published", str(tally.published)), ("broken", str(tally.broken)))
             if latest is not None and tally.broken:
                 yield Status(name, ERROR, latest.text(), counts)
             elif not tally.judged:
                 yield Status(name, STALE, tally.reason or "not judged yet", counts)
-            elif tally.undecided or tally.order or tally.forgotten or tally.unanswered:
-                yield Status(name, WARN, coverage(tally), counts)
+            elif lost or tally.undecided or tally.order or tally.forgotten or tally.unanswered:
+                yield Status(name, WARN, lost or coverage(tally), counts)
             else:
                 yield Status(name, OK, coverage(tally), counts)
         for name, violation in told.items():
@@ -163,11 +163,12 @@ def graph_of(
             domain = domain_of(text)
         except ValueError as error:
             raise Rejected(Diagnostic("MON303", str(error), hint="--live dds:0")) from None
+        heard = [topic for topic in running.topics if carriers(topic, "")]
         graph = Dds(domain, heard, running.kinds, running.known, host)
     else:
         hint = "ros1, ros1:http://host:11311, ros2, or ros2:42"
         raise Rejected(Diagnostic("MON303", f"{text!r} is no graph that can be listened to", hint=hint))
     for topic in running.topics:
         if topic not in heard:
-            graph.inbox.trouble(topic, f"{topic}: calls of services and actions are not heard on a running graph")
+            graph.inbox.trouble(topic, f"{topic} is not heard on a running {kind} graph")
     return graph

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from types import TracebackType
 from typing import Protocol
 
-from avow.ros.bags import Event
+from avow.ros.bags import LOST, Event
 
 from ..tuning import QUEUED_MESSAGES
 
@@ -27,6 +27,7 @@ class Heard:
     time: float
     read: Callable[[], Event] | None
     trouble: str = ""
+    mark: str = LOST
     forward: Callable[[], None] | None = None
     """For a filtered topic: passes the message on."""
 
@@ -35,25 +36,27 @@ class Inbox:
     """The messages that wait to be judged, in the order of arrival, whichever thread receives them."""
 
     def __init__(self) -> None:
-        self._queue: queue.Queue[Heard] = queue.Queue(QUEUED_MESSAGES)
+        self._queue: queue.SimpleQueue[Heard] = queue.SimpleQueue()
         self._lock = threading.Lock()
-        self.dropped = 0
+        self._full: set[str] = set()
+        """The topics of the messages that came since there was no room."""
 
     def message(self, topic: str, read: Callable[[float], Event], forward: Callable[[], None] | None = None) -> None:
         """A message has come just now; it is read, as an event of that time, when it is judged."""
         with self._lock:
             now = time.time()
-            self._put(Heard(topic, now, lambda: read(now), forward=forward))
+            if self._queue.qsize() < QUEUED_MESSAGES:
+                self._full.discard(topic)
+                self._queue.put(Heard(topic, now, lambda: read(now), forward=forward))
+            elif topic not in self._full:
+                self._full.add(topic)
+                text = f"messages of {topic} came faster than they were judged, and are lost"
+                self._queue.put(Heard(topic, now, None, text))
 
-    def trouble(self, topic: str, text: str) -> None:
+    def trouble(self, topic: str, text: str, mark: str = LOST) -> None:
+        """Messages of a topic cannot be heard; `mark`: that of the event in the record."""
         with self._lock:
-            self._put(Heard(topic, time.time(), None, text))
-
-    def _put(self, heard: Heard) -> None:
-        try:
-            self._queue.put_nowait(heard)
-        except queue.Full:
-            self.dropped += 1
+            self._queue.put(Heard(topic, time.time(), None, text, mark))
 
     def get(self, seconds: float) -> Heard | None:
         """The next one, or None if none comes within `seconds`."""

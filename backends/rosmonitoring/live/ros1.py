@@ -24,7 +24,7 @@ from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, TypesysError, get_types_from_msg, get_typestore
 
 from avow.base.diagnostics import Diagnostic, Rejected
-from avow.ros.bags import Event, enveloped, plainer
+from avow.ros.bags import GONE, LOST, Event, enveloped, plainer
 from avow.ros.master import FAILURES, interface
 
 from ..session import raw
@@ -57,6 +57,7 @@ class Ros1:
         self.inbox = Inbox()
         self._uri = master
         self._heard: dict[tuple[str, str], threading.Event] = {}
+        self._reached: set[tuple[str, str]] = set()
         """(topic, publisher) → set once the master no longer names it."""
         self._lock = threading.Lock()
         self._over = threading.Event()
@@ -192,16 +193,15 @@ class Ros1:
                 self._trouble(topic, uri, str(error))
                 break
             except FAILURES as error:
-                if not isinstance(error, EOFError):
-                    self._trouble(topic, uri, f"{error}; it is asked again")
+                self._trouble(topic, uri, f"{error}; it is asked again", GONE)
             gone.wait(AGAIN_SECONDS)
         with self._lock:
             if self._heard.get((topic, uri)) is gone:
                 del self._heard[topic, uri]
 
-    def _trouble(self, topic: str, uri: str, text: str) -> None:
+    def _trouble(self, topic: str, uri: str, text: str, mark: str = LOST) -> None:
         if not self._over.is_set():
-            self.inbox.trouble(topic, f"{topic} from {uri}: {text}")
+            self.inbox.trouble(topic, f"{topic} from {uri}: {text}", mark)
 
     def _hear(self, topic: str, uri: str, gone: threading.Event) -> None:
         """Listen to one publisher until the connection closes. Raises Rejected, ValueError, and those of `FAILURES`."""
@@ -215,6 +215,9 @@ class Ros1:
             line.settimeout(None)  # from now on it may be silent
             read = reader(topic, fields)
             forward = self._forward(topic, fields)
+            if (topic, uri) in self._reached:
+                self._trouble(topic, uri, "it was out of reach: what it published in that time is lost")
+            self._reached.add((topic, uri))
             while not (self._over.is_set() or gone.is_set()):
                 said = frame(line, FRAME_BYTES)
                 on = None if forward is None else partial(forward, said)

@@ -1,8 +1,9 @@
 """ROSMonitoring's oracle protocol over a WebSocket: our engine in place of the RML oracle.
 
 One text frame for each event, one reply each: the event with a `verdict`. A reply without one would be read as a final
-"true", and a final verdict ends the monitoring, so the answers are always ``currently_true`` or ``currently_false``.
-Each connection has its own monitors, which begin with it.
+"true", and a final verdict ends the monitoring, so the answers are ``currently_true``, ``currently_false``, or, if
+nothing was decided, ``unknown``: ROSMonitoring passes such a message on. Each connection has its own monitors, which
+begin with it.
 """
 
 from __future__ import annotations
@@ -28,14 +29,20 @@ def answer(session: Session, frame: str | bytes) -> str:
         reply: dict[str, Any] = json.loads(text)
     except (ValueError, RecursionError) as error:
         return json.dumps({"verdict": "currently_false", "error": f"this is no event: {error}"})
+    before = _decided(session)
     found = list(session.step(event))
-    reply["verdict"] = "currently_false" if found else "currently_true"
+    reply["verdict"] = "unknown" if _decided(session) == before else "currently_true"
     if found:
+        reply["verdict"] = "currently_false"
         reply["violations"] = [violation_json(v) for v in found]
     try:
         return json.dumps(reply)
     except RecursionError:
         return json.dumps({"verdict": reply["verdict"]})
+
+
+def _decided(session: Session) -> int:
+    return sum(tally.decided for *_, tally in session.clauses())
 
 
 def serve(make: Callable[[], Session], port: int, ready: Callable[[Any], None] | None = None) -> None:
