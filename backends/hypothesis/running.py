@@ -105,6 +105,7 @@ class Bench:
         self.unsteady: Inputs | None = None
         self.shrinking: str | None = None
         """The guarantee whose failure is being simplified; empty: the crash; None while cases are counted."""
+        self.simplified: set[str] = set()
         self._why: str | None = None
         """Why the cases ended early, if they did."""
         self._over = False
@@ -233,7 +234,11 @@ class Bench:
         self.keeper.advance(valuation(inputs, found))
         self.memory = self.unit.memory(found)
         if self.shrinking is not None:
-            if self.shrinking and self.guarantees[self.shrinking].judged.holds(values) is False:
+            broken = [name for name, each in self.guarantees.items() if each.judged.holds(values) is False]
+            for name in broken:  # a simpler case may violate others, which no case violated before
+                if name not in self.simplified:
+                    self.traces.setdefault(name, list(self.trace))
+            if self.shrinking in broken:
                 self.traces[self.shrinking] = list(self.trace)
                 raise _Broken
             return
@@ -278,8 +283,8 @@ class Bench:
             self._replay_kept()
             stopped = self._sweep()
             self._hold()
-            for name in list(self.traces):
-                self._simplify(name)
+            while waiting := self.traces.keys() - self.simplified:
+                self._simplify(next(name for name in self.traces if name in waiting))
             if self.crash and not self.unit.process.silent and not self.unit.process.fault:
                 self._simplify("")
             if not self.crash and not self.unit.process.fault:
@@ -321,6 +326,7 @@ class Bench:
         """Find the simplest run that violates a guarantee (or in which the unit fails), within the time, and repeat it
         in a process of its own."""
         first, end = self.traces.get(name, []), self.end
+        self.simplified.add(name)
         self.shrinking, self.end = name, min(end, self.spent() + SHRINKING_SECONDS)
         with contextlib.suppress(_Broken, _Stop, Flaky, Unsatisfiable, FailedHealthCheck):
             self._run_test((Phase.generate, Phase.shrink))

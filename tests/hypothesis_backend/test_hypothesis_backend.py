@@ -178,6 +178,15 @@ def test_printing_does_not_disturb(tmp_path: Path) -> None:
     assert {o.verdict for o in settle(job(tmp_path, noisy)).values()} == {Verdict.TESTED}
 
 
+def test_what_the_search_for_a_simple_case_violates_is_refuted(tmp_path: Path) -> None:
+    """`early` is simplified to x = 70, which violates `late` too: none of the two cases that were drawn does."""
+    text = "node n { inputs( x : REAL, z : REAL ) outputs( y : INTEGER ) topics() assume up ( in.x >= 0 and in.z >= 0 )"
+    text += " guarantee early ( in.x * in.x * in.x <= 70 or out.y == 0 )"
+    text += " guarantee late ( abs(in.x * in.x * in.x - 343000) >= 0.001 or out.y == 0 ) }"
+    found = settle(job(tmp_path, "def step(x, z):\n    return {'y': 1}", text, "n", cases=2))
+    assert {name: o.verdict for name, o in found.items()} == dict.fromkeys(("early", "late"), Verdict.REFUTED)
+
+
 @pytest.mark.slow
 def test_a_faulty_guarantee_is_refuted_even_if_the_subject_crashes_elsewhere(tmp_path: Path) -> None:
     text = STEP.replace("r < 120", "r < 110").replace("    done =", "    assert r < 590\n    done =", 1)
