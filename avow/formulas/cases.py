@@ -11,7 +11,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from avow.base.tuning.bounds import ATOMS_MADE
-from avow.formulas.traversal import Steps, each, run
 from avow.language import terms as t
 from avow.language.operators import definition
 from avow.language.sorts import BOOL
@@ -23,21 +22,18 @@ class TooManyCases(Exception):  # noqa: N818 - it names what the formula has
 
 def lifted(formula: t.Term) -> t.Term:
     """The formula without operators that choose between terms. Raises TooManyCases."""
-    return run(_formula(formula, iter(range(ATOMS_MADE))))
+    return _formula(formula, iter(range(ATOMS_MADE)))
 
 
-def _formula(term: t.Term, left: Iterator[int]) -> Steps[t.Term]:
+def _formula(term: t.Term, left: Iterator[int]) -> t.Term:
     match term:
         case t.Operation() if (made_of := definition(term)) is not None:
-            defined: t.Term = yield _formula(made_of, left)
-            return defined
+            return _formula(made_of, left)
         case t.Conditional(condition=condition, then=then, otherwise=otherwise):
             parts = (t.Implies(condition, then, term.span), t.Implies(t.Not(condition), otherwise, term.span))
-            cases: t.Term = yield _formula(t.And(parts, term.span), left)
-            return cases
+            return _formula(t.And(parts, term.span), left)
         case t.Not() | t.And() | t.Or() | t.Implies() | t.Iff() | t.Quantified():
-            made = yield from each(_formula(child, left) for child in term.children)
-            return term.rebuild(tuple(made))
+            return term.rebuild(tuple(_formula(child, left) for child in term.children))
         case _:  # an atom
             if next(left, None) is None:
                 raise TooManyCases
@@ -45,8 +41,7 @@ def _formula(term: t.Term, left: Iterator[int]) -> Steps[t.Term]:
             if chosen is None:
                 return term
             condition, one, other = chosen
-            result: t.Term = yield _formula(t.Conditional(condition, one, other, BOOL, term.span), left)
-            return result
+            return _formula(t.Conditional(condition, one, other, BOOL, term.span), left)
 
 
 def _choice(term: t.Term) -> tuple[t.Term, t.Term, t.Term] | None:

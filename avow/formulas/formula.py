@@ -13,7 +13,6 @@ from typing import assert_never
 
 from avow.base.remembered import by_identity
 from avow.formulas.flattening import joined
-from avow.formulas.traversal import Steps, each, run
 from avow.language import sorts as s
 from avow.language import terms as t
 from avow.language.contract import Clause, Node
@@ -77,7 +76,7 @@ def substitute(term: t.Term, mapping: Mapping[t.Variable, t.Term]) -> t.Term:
     taken = {variable.name for replacement in mapping.values() for variable in free_variables(replacement)}
     taken |= {variable.name for variable in free_variables(term)}
 
-    def steps(current: t.Term, active: Mapping[t.Variable, t.Term]) -> Steps[t.Term]:
+    def changed(current: t.Term, active: Mapping[t.Variable, t.Term]) -> t.Term:
         if isinstance(current, t.Variable):
             return active.get(current, current)
         if isinstance(current, t.Quantified):
@@ -90,12 +89,11 @@ def substitute(term: t.Term, mapping: Mapping[t.Variable, t.Term]) -> t.Term:
                     taken.add(name)
                     inner[variable] = renamed
                 renewed.append(renamed)
-            body: t.Term = yield steps(current.body, inner)
-            return t.Quantified(current.quantifier, tuple(renewed), body, current.span)
-        parts = yield from each(steps(child, active) for child in current.children)
-        return current.rebuild(tuple(parts)) if parts else current
+            return t.Quantified(current.quantifier, tuple(renewed), changed(current.body, inner), current.span)
+        parts = tuple(changed(child, active) for child in current.children)
+        return current.rebuild(parts) if parts else current
 
-    return run(steps(term, dict(mapping)))
+    return changed(term, dict(mapping))
 
 
 def fresh(name: str, taken: Collection[str]) -> str:
@@ -110,7 +108,7 @@ def fresh(name: str, taken: Collection[str]) -> str:
 
 def normalise(term: t.Term) -> t.Term:
     """The normal form: same meaning, bound variables renamed by depth, commutative parts in a fixed order."""
-    return run(_normal(term, {}, 0))[0]
+    return _normal(term, {}, 0)[0]
 
 
 def digest(*terms: t.Term) -> str:
@@ -121,7 +119,7 @@ def digest(*terms: t.Term) -> str:
 @by_identity(50_000)
 def meaning(term: t.Term) -> str:
     """SHA-256 of the meaning of one formula."""
-    return run(_normal(term, {}, 0))[1]
+    return _normal(term, {}, 0)[1]
 
 
 @by_identity(50_000)
@@ -172,14 +170,14 @@ _Keyed = tuple[t.Term, str]
 _FLIPPED = {">": "<", ">=": "<="}
 
 
-def _normal(term: t.Term, scope: Mapping[t.Variable, t.Variable], level: int) -> Steps[_Keyed]:
+def _normal(term: t.Term, scope: Mapping[t.Variable, t.Variable], level: int) -> _Keyed:
     if isinstance(term, t.Quantified):
-        return (yield from _normal_quantified(term, scope, level))
+        return _normal_quantified(term, scope, level)
     if isinstance(term, t.Variable):
         return _keyed(scope.get(term, term))
     if isinstance(term, t.And | t.Or):
-        return (yield from _normal_junction(term, scope, level))
-    parts = yield from each(_normal(child, scope, level) for child in term.children)
+        return _normal_junction(term, scope, level)
+    parts = [_normal(child, scope, level) for child in term.children]
     match term:
         case t.Not():
             return _not(parts[0])
@@ -199,7 +197,7 @@ def _normal(term: t.Term, scope: Mapping[t.Variable, t.Variable], level: int) ->
             return _make(term, parts)
 
 
-def _normal_quantified(term: t.Quantified, scope: Mapping[t.Variable, t.Variable], level: int) -> Steps[_Keyed]:
+def _normal_quantified(term: t.Quantified, scope: Mapping[t.Variable, t.Variable], level: int) -> _Keyed:
     variables, body = list(term.variables), term.body
     while (
         term.quantifier is not t.Quantifier.UNIQUE
@@ -214,12 +212,12 @@ def _normal_quantified(term: t.Quantified, scope: Mapping[t.Variable, t.Variable
         canonical = t.Variable(t.Role.BOUND, f"${level + offset}", variable.sort)
         fresh.append(canonical)
         inner[variable] = canonical
-    part: _Keyed = yield _normal(body, inner, level + len(variables))
+    part = _normal(body, inner, level + len(variables))
     sorts = (sort_digest(v.sort) for v in fresh)
     return t.Quantified(term.quantifier, tuple(fresh), part[0]), _hash(term.quantifier, *sorts, part[1])
 
 
-def _normal_junction(term: t.And | t.Or, scope: Mapping[t.Variable, t.Variable], level: int) -> Steps[_Keyed]:
+def _normal_junction(term: t.And | t.Or, scope: Mapping[t.Variable, t.Variable], level: int) -> _Keyed:
     kind = type(term)
     unit, zero = (t.TRUE, t.FALSE) if kind is t.And else (t.FALSE, t.TRUE)
     unique: dict[str, t.Term] = {}
@@ -229,7 +227,7 @@ def _normal_junction(term: t.And | t.Or, scope: Mapping[t.Variable, t.Variable],
         if isinstance(item, kind):
             stack.extend(reversed(item.items))
             continue
-        part: _Keyed = yield _normal(item, scope, level)
+        part = _normal(item, scope, level)
         if isinstance(part[0], kind):  # such as the normal form of "p and q == TRUE"
             unique.update((_term_key(inner), inner) for inner in part[0].items)
         elif part[0] == zero:
@@ -289,12 +287,7 @@ def _keyed(term: t.Term) -> _Keyed:
 
 def _term_key(term: t.Term) -> str:
     """The digest of a term that is already normal."""
-
-    def steps(current: t.Term) -> Steps[str]:
-        keys = yield from each(map(steps, current.children))
-        return _hash(*_head(current), *keys)
-
-    return run(steps(term))
+    return _hash(*_head(term), *map(_term_key, term.children))
 
 
 def _head(term: t.Term) -> tuple[str, ...]:

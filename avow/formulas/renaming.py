@@ -6,7 +6,6 @@ import dataclasses
 from collections.abc import Callable, Iterable, Mapping
 
 from avow.formulas.formula import free_variables, fresh
-from avow.formulas.traversal import Steps, each, run
 from avow.language.subterms import subterms
 from avow.language.terms import Quantified, Role, Term, Variable
 
@@ -27,7 +26,7 @@ def rename_apart(term: Term, taken: Iterable[str] = ()) -> Term:
         return term
     used = {*bound_names(term), *taken}
 
-    def steps(part: Term, names: Mapping[str, str]) -> Steps[Term]:
+    def renamed(part: Term, names: Mapping[str, str]) -> Term:
         if isinstance(part, Variable):
             name = names.get(part.name, part.name) if part.role is Role.BOUND else part.name
             return part if name == part.name else dataclasses.replace(part, name=name)
@@ -36,10 +35,10 @@ def rename_apart(term: Term, taken: Iterable[str] = ()) -> Term:
             for variable in part.variables:
                 names[variable.name] = fresh(variable.name, used)
                 used.add(names[variable.name])
-        children = yield from each(steps(child, names) for child in part.children)
+        children = tuple(renamed(child, names) for child in part.children)
         if isinstance(part, Quantified):
             variables = tuple(dataclasses.replace(v, name=names[v.name]) for v in part.variables)
             return dataclasses.replace(part, variables=variables, body=children[0])
-        return part.rebuild(tuple(children)) if children else part
+        return part.rebuild(children) if children else part
 
-    return run(steps(term, {}))
+    return renamed(term, {})

@@ -16,7 +16,6 @@ from typing import Any, assert_never
 from avow.base.diagnostics import Span
 from avow.base.tuning.bounds import FORMULAS_KEPT
 from avow.formulas.one_point_rule import made_with, without_points
-from avow.formulas.traversal import Steps, run
 from avow.language import sorts as s
 from avow.language import terms as t
 from avow.language.operators import OPERATORS, implementation
@@ -73,42 +72,37 @@ class Translator(Sorts):
         """The Z3 expression of a term. `meanings` replaces free variables, `bound` gives bound variables of an outer
         quantifier. Raises Unsupported."""
         if bound or meanings:
-            return run(self._term(without_points(term), dict(bound or {}), meanings or {}))
+            return self._term(without_points(term), dict(bound or {}), meanings or {})
         formulas = self.session.formulas
         if id(term) not in formulas:
             if len(formulas) >= FORMULAS_KEPT:
                 formulas.clear()
-            formulas[id(term)] = term, run(self._term(without_points(term), {}, {}))
+            formulas[id(term)] = term, self._term(without_points(term), {}, {})
         return formulas[id(term)][1]
 
-    def _term(
-        self, term: t.Term, bound: Mapping[t.Variable, Expr], meanings: Mapping[t.Variable, Meaning]
-    ) -> Steps[Expr]:
+    def _term(self, term: t.Term, bound: Mapping[t.Variable, Expr], meanings: Mapping[t.Variable, Meaning]) -> Expr:
         match term:
             case t.Variable():
                 return self._value_of(term, bound, meanings)
             case t.Apply(function=function, arguments=terms):
                 if not isinstance(function, t.Variable):
                     raise Unsupported("the application of something other than a variable", term.span)
-                arguments = yield self._terms(terms, bound, meanings)
+                arguments = self._terms(terms, bound, meanings)
                 apply = self._callable(function, bound, meanings)
                 sort = function.sort
                 assert isinstance(sort, s.FunctionSort)
                 return apply(*(self._fit(a, p) for a, p in zip(arguments, sort.parameters, strict=True)))
             case t.Compare():
-                result = yield self._compare(term, bound, meanings)
-                return result
+                return self._compare(term, bound, meanings)
             case t.In():
-                result = yield self._in(term, bound, meanings)
-                return result
+                return self._in(term, bound, meanings)
             case t.Quantified():
-                result = yield self._quantified(term, bound, meanings)
-                return result
+                return self._quantified(term, bound, meanings)
             case t.Length(sequence=t.SequenceRange(low=low, high=high)):
-                one, other = yield self._terms((low, high), bound, meanings)
+                one, other = self._terms((low, high), bound, meanings)
                 return z3.If(other >= one, other - one + 1, z3.IntVal(0, self.context))
             case _:  # determined by its parts
-                parts = yield self._terms(term.children, bound, meanings)
+                parts = self._terms(term.children, bound, meanings)
                 return self._made(term, parts)
 
     def _made(self, term: t.Term, parts: list[Expr]) -> Expr:
@@ -171,12 +165,8 @@ class Translator(Sorts):
 
     def _terms(
         self, terms: Iterable[t.Term], bound: Mapping[t.Variable, Expr], meanings: Mapping[t.Variable, Meaning]
-    ) -> Steps[list[Expr]]:
-        values = []
-        for term in terms:
-            value = yield self._term(term, bound, meanings)
-            values.append(value)
-        return values
+    ) -> list[Expr]:
+        return [self._term(term, bound, meanings) for term in terms]
 
     def _value_of(
         self, variable: t.Variable, bound: Mapping[t.Variable, Expr], meanings: Mapping[t.Variable, Meaning]
@@ -202,7 +192,7 @@ class Translator(Sorts):
 
     def _compare(
         self, term: t.Compare, bound: Mapping[t.Variable, Expr], meanings: Mapping[t.Variable, Meaning]
-    ) -> Steps[Expr]:
+    ) -> Expr:
         if isinstance(term.left.sort, s.FunctionSort):
             if not (isinstance(term.left, t.Variable) and isinstance(term.right, t.Variable)):
                 raise Unsupported("the comparison of functions that are not variables", term.span)
@@ -212,14 +202,14 @@ class Translator(Sorts):
             return same if term.operator == "==" else z3.Not(same)
         for one, other in ((term.left, term.right), (term.right, term.left)):
             if isinstance(one, t.SequenceRange) and not _is_written_out(one):
-                same = yield self._same_range(one, other, bound, meanings)
+                same = self._same_range(one, other, bound, meanings)
                 return same if term.operator == "==" else z3.Not(same)
         made = made_with(term)
         if made is not None:
-            value = yield self._term(term.left, bound, meanings)
+            value = self._term(term.left, bound, meanings)
             same = self.sort(term.left.sort).recognizer(_place(term.left.sort, made))(value)
             return same if term.operator == "==" else z3.Not(same)
-        left, right = yield self._terms((term.left, term.right), bound, meanings)
+        left, right = self._terms((term.left, term.right), bound, meanings)
         if left.sort() != right.sort():
             left, right = self._real(left), self._real(right)
         return implementation(OPERATORS[term.operator].z3)(z3, left, right)
@@ -236,40 +226,40 @@ class Translator(Sorts):
         other: t.Term,
         bound: Mapping[t.Variable, Expr],
         meanings: Mapping[t.Variable, Meaning],
-    ) -> Steps[Expr]:
+    ) -> Expr:
         """The equality of a range, which the solver has no value for, and another sequence: the same length, and the
         same number at every position."""
-        low, high = yield self._terms((one.low, one.high), bound, meanings)
+        low, high = self._terms((one.low, one.high), bound, meanings)
         if isinstance(other, t.SequenceRange):
-            start, end = yield self._terms((other.low, other.high), bound, meanings)
+            start, end = self._terms((other.low, other.high), bound, meanings)
             return z3.Or(z3.And(low == start, high == end), z3.And(high < low, end < start))
-        sequence = yield self._term(other, bound, meanings)
+        sequence = self._term(other, bound, meanings)
         length, k = z3.Length(sequence), self.fresh("k", s.INTEGER)
         inside = z3.And(k >= 0, k < length)
         count = z3.If(high >= low, high - low + 1, z3.IntVal(0, self.context))
         return z3.And(length == count, z3.ForAll([k], z3.Implies(inside, sequence[k] == low + k)))
 
-    def _in(self, term: t.In, bound: Mapping[t.Variable, Expr], meanings: Mapping[t.Variable, Meaning]) -> Steps[Expr]:
-        item = yield self._term(term.item, bound, meanings)
+    def _in(self, term: t.In, bound: Mapping[t.Variable, Expr], meanings: Mapping[t.Variable, Meaning]) -> Expr:
+        item = self._term(term.item, bound, meanings)
         match term.collection:
             case t.SetTerm(items=items) | t.SequenceTerm(items=items):
-                values = yield self._terms(items, bound, meanings)
+                values = self._terms(items, bound, meanings)
                 equal = [self._equal(item, value) for value in values]
                 return z3.Or(equal) if equal else z3.Not(self.true())
             case t.SequenceRange(low=low, high=high):
-                one, other = yield self._terms((low, high), bound, meanings)
+                one, other = self._terms((low, high), bound, meanings)
                 return z3.And(one <= item, item <= other)
             case collection:
-                sequence = yield self._term(collection, bound, meanings)
+                sequence = self._term(collection, bound, meanings)
                 assert isinstance(collection.sort, s.SequenceSort)
                 return z3.Contains(sequence, z3.Unit(self._fit(item, collection.sort.item)))
 
     def _quantified(
         self, term: t.Quantified, bound: Mapping[t.Variable, Expr], meanings: Mapping[t.Variable, Meaning]
-    ) -> Steps[Expr]:
+    ) -> Expr:
         constants = [self.fresh(variable.name, variable.sort) for variable in term.variables]
         inner = {**bound, **dict(zip(term.variables, constants, strict=True))}
-        body = yield self._term(term.body, inner, meanings)
+        body = self._term(term.body, inner, meanings)
         members = [self.member(v.sort, c) for v, c in zip(term.variables, constants, strict=True)]
         for root, fact in self.root_facts([body]):
             if not {c.get_id() for c in constants}.isdisjoint(part.get_id() for part in parts_of([fact])):

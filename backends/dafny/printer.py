@@ -19,7 +19,6 @@ from avow.base.diagnostics import Span
 from avow.base.plain import decimal
 from avow.base.records import dataclass
 from avow.formulas.formula import free_variables
-from avow.formulas.traversal import Steps, run
 from avow.language import sorts as s
 from avow.language import terms as t
 from avow.language.operators import OPERATORS, Level, Operator, Why
@@ -103,7 +102,7 @@ def sort_text(sort: s.Sort, words: Vocabulary) -> str:
 def print_clause(name: str, formula: t.Term, words: Vocabulary) -> tuple[Predicate, ...]:
     """The predicate of a clause, after those of its quantifiers. Raises NotExpressible."""
     printer = _Printer(name, words)
-    body, _ = run(printer.term(formula, words.ports))
+    body, _ = printer.term(formula, words.ports)
     parameters = printer.parameters(formula, words.ports)
     whole = Predicate(words.names("clause", name), parameters, body, name)
     return (*printer.made, whole)
@@ -141,25 +140,18 @@ class _Printer:
         free = free_variables(term)
         return tuple(variable for variable in scope if variable in free)
 
-    def operand(self, term: t.Term, scope: tuple[t.Variable, ...]) -> Steps[str]:
-        text, atomic = yield self.term(term, scope)
+    def operand(self, term: t.Term, scope: tuple[t.Variable, ...]) -> str:
+        text, atomic = self.term(term, scope)
         return text if atomic else f"({text})"
 
-    def list(self, terms: tuple[t.Term, ...], scope: tuple[t.Variable, ...]) -> Steps[str]:
-        texts = []
-        for term in terms:
-            text, _ = yield self.term(term, scope)
-            texts.append(text)
-        return ", ".join(texts)
+    def list(self, terms: tuple[t.Term, ...], scope: tuple[t.Variable, ...]) -> str:
+        return ", ".join(self.term(term, scope)[0] for term in terms)
 
-    def infix(self, operator: str, terms: tuple[t.Term, ...], scope: tuple[t.Variable, ...]) -> Steps[_Text]:
-        texts = []
-        for term in terms:
-            texts.append((yield self.operand(term, scope)))
+    def infix(self, operator: str, terms: tuple[t.Term, ...], scope: tuple[t.Variable, ...]) -> _Text:
+        texts = [self.operand(term, scope) for term in terms]
         return f" {OPERATORS[operator].dafny} ".join(texts), len(texts) == 1
 
-    def term(self, term: t.Term, scope: tuple[t.Variable, ...]) -> Steps[_Text]:
-        whole: _Text
+    def term(self, term: t.Term, scope: tuple[t.Variable, ...]) -> _Text:
         match term:
             case t.Literal():
                 return _literal(term)
@@ -168,97 +160,82 @@ class _Printer:
             case t.Variable():
                 return self.words.local(term), True
             case t.Construct(constructor=name, arguments=arguments, sort=sort):
-                inner = yield self.list(arguments, scope)
+                inner = self.list(arguments, scope)
                 made = self.words.constructor(sort, name)
                 return (f"{made}({inner})" if arguments else made), True
             case t.Apply(function=function, arguments=arguments):
-                head = yield self.operand(function, scope)
-                inner = yield self.list(arguments, scope)
+                head = self.operand(function, scope)
+                inner = self.list(arguments, scope)
                 return f"{head}({inner})", True
             case t.Index(sequence=sequence, index=index):
-                inner = yield self.list((sequence, index), scope)
+                inner = self.list((sequence, index), scope)
                 return f"Types.Nth({inner})", True
             case t.Item(record=record, position=position):
-                inner = yield self.operand(record, scope)
+                inner = self.operand(record, scope)
                 return f"{inner}.{position}", True
             case t.Argument():
                 raise NotExpressible("an argument of a value's constructor", term.span)
             case t.Length(sequence=sequence):
-                inner, _ = yield self.term(sequence, scope)
+                inner, _ = self.term(sequence, scope)
                 return f"|{inner}|", True
             case t.Widen(term=inner_term):
-                inner = yield self.operand(inner_term, scope)
+                inner = self.operand(inner_term, scope)
                 return f"{inner} as real", False
             case t.Negative(term=inner_term, sort=sort):
-                inner = yield self.operand(inner_term, scope)
+                inner = self.operand(inner_term, scope)
                 # For a natural, Dafny 2.3 takes `-n` to be one too, and then complains that it may not be.
                 return (f"-{inner}" if sort == s.REAL or isinstance(inner_term, t.Literal) else f"0 - {inner}"), False
             case t.Arithmetic(operator=operator) | t.Operation(operator=operator):
-                whole = yield self.operation(OPERATORS[operator], term, scope)
-                return whole
+                return self.operation(OPERATORS[operator], term, scope)
             case t.Conditional(condition=condition, then=then, otherwise=otherwise):
-                test, _ = yield self.term(condition, scope)
-                yes, _ = yield self.term(then, scope)
-                no, _ = yield self.term(otherwise, scope)
+                test, _ = self.term(condition, scope)
+                yes, _ = self.term(then, scope)
+                no, _ = self.term(otherwise, scope)
                 return f"(if {test} then {yes} else {no})", True
             case t.TupleTerm(items=items):
                 if len(items) < 2:
                     raise NotExpressible("a tuple of fewer than two items", term.span)
-                inner = yield self.list(items, scope)
+                inner = self.list(items, scope)
                 return f"({inner})", True
             case t.SequenceTerm(items=items, sort=sequence_sort):
-                inner = yield self.list(items, scope)
+                inner = self.list(items, scope)
                 if items:
                     return f"[{inner}]", True
                 # An empty display alone does not determine its type.
                 return f"(var nothing: {sort_text(sequence_sort, self.words)} := []; nothing)", True
             case t.SequenceRange(low=low, high=high):
-                inner = yield self.list((low, high), scope)
+                inner = self.list((low, high), scope)
                 return f"Types.Upto({inner})", True
             case t.SetTerm():
                 raise NotExpressible("a set outside 'in'", term.span)
             case t.History(operator=operator):
                 raise NotExpressible(f"'{operator}', which speaks of other steps", term.span)
             case t.Compare(operator=operator, left=left, right=right):
-                whole = yield self.infix(operator, (left, right), scope)
-                return whole
+                return self.infix(operator, (left, right), scope)
             case t.In(item=item, collection=collection):
-                whole = yield self.membership(item, collection, scope)
-                return whole
+                return self.membership(item, collection, scope)
             case t.Not(body=body):
-                inner = yield self.operand(body, scope)
+                inner = self.operand(body, scope)
                 return f"!{inner}", True
             case t.And(items=items):
-                whole = (yield self.infix("and", items, scope)) if items else ("true", True)
-                return whole
+                return self.infix("and", items, scope) if items else ("true", True)
             case t.Or(items=items):
-                whole = (yield self.infix("or", items, scope)) if items else ("false", True)
-                return whole
+                return self.infix("or", items, scope) if items else ("false", True)
             case t.Implies(left=left, right=right):
-                whole = yield self.infix("->", (left, right), scope)
-                return whole
+                return self.infix("->", (left, right), scope)
             case t.Iff(left=left, right=right):
-                whole = yield self.infix("<=>", (left, right), scope)
-                return whole
+                return self.infix("<=>", (left, right), scope)
             case t.Quantified():
-                whole = yield self.quantified(term, scope)
-                return whole
+                return self.quantified(term, scope)
             case _:
                 assert_never(term)
 
-    def operation(
-        self, operator: Operator, term: t.Arithmetic | t.Operation, scope: tuple[t.Variable, ...]
-    ) -> Steps[_Text]:
-        whole: _Text
+    def operation(self, operator: Operator, term: t.Arithmetic | t.Operation, scope: tuple[t.Variable, ...]) -> _Text:
         if isinstance(operator.dafny, Why):
             raise NotExpressible(f"'{operator.name}': {operator.dafny.reason}", term.span)
         if not operator.dafny.startswith("Types."):
-            whole = yield self.infix(operator.name, term.children, scope)
-            return whole
-        texts = []
-        for argument in term.children:
-            text, _ = yield self.term(argument, scope)
-            texts.append(text)
+            return self.infix(operator.name, term.children, scope)
+        texts = [self.term(argument, scope)[0] for argument in term.children]
         if operator.level is not Level.ATOM:
             return f"{operator.dafny}({', '.join(texts)})", True
         sorts = {argument.sort for argument in term.children}
@@ -268,25 +245,22 @@ class _Printer:
             return f"{name}({', '.join(texts)})", True
         return reduce(lambda a, b: f"{name}({a}, {b})", texts), True  # any number of arguments: pairwise
 
-    def membership(self, item: t.Term, collection: t.Term, scope: tuple[t.Variable, ...]) -> Steps[_Text]:
-        left = yield self.operand(item, scope)
+    def membership(self, item: t.Term, collection: t.Term, scope: tuple[t.Variable, ...]) -> _Text:
+        left = self.operand(item, scope)
         if not isinstance(collection, t.SetTerm):
-            right = yield self.operand(collection, scope)
+            right = self.operand(collection, scope)
             return f"{left} in {right}", False
         if not collection.items:
             return "false", True
         # A disjunction, not a set display: it needs no compilable equality.
-        parts = []
-        for member in collection.items:
-            text = yield self.operand(member, scope)
-            parts.append(f"{left} == {text}")
+        parts = [f"{left} == {self.operand(member, scope)}" for member in collection.items]
         return (f"({parts[0]})", True) if len(parts) == 1 else (" || ".join(parts), False)
 
-    def quantified(self, term: t.Quantified, scope: tuple[t.Variable, ...]) -> Steps[_Text]:
+    def quantified(self, term: t.Quantified, scope: tuple[t.Variable, ...]) -> _Text:
         self.count += 1
         name = self.words.names.fresh(f"{self.clause}_{_KINDS[term.quantifier]}{self.count}")
         inner_scope = scope + term.variables
-        body, _ = yield self.term(term.body, inner_scope)
+        body, _ = self.term(term.body, inner_scope)
         outer = self.parameters(term, scope)
         # Every bound variable is a parameter, used or not: the call is the only trigger term.
         predicate = Predicate(name, outer + term.variables, body, self.clause)

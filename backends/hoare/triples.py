@@ -14,7 +14,6 @@ from avow.base.records import dataclass
 from avow.formulas.disjunctions import conjuncts
 from avow.formulas.formula import conjunction, equation, free_variables, negation, substitute
 from avow.formulas.renaming import rename_apart
-from avow.formulas.traversal import Steps, run
 from avow.language import terms as t
 from avow.language.contract import Clause, Node
 from avow.language.printer import show_term
@@ -142,27 +141,20 @@ def _translate_formula(formula: t.Term, reading: Reading, clause: Clause) -> t.T
             widened.append(t.Compare(">=", found, t.Literal(0, INTEGER)))
         return found
 
-    def steps(current: t.Term) -> Steps[t.Term]:
+    def read(current: t.Term) -> t.Term:
         if isinstance(current, t.Variable):
             return current if current.role is t.Role.BOUND else port(current)
         if isinstance(current, t.Compare) and isinstance(current.left.sort, FunctionSort):
-            pointwise: t.Term = yield steps(_pointwise(current))
-            return pointwise
+            return read(_pointwise(current))
         if isinstance(current, t.Apply) and isinstance(current.function, t.Variable):
             predicate = reading.predicates.get((current.function.role, current.function.name))
             if predicate is not None:
-                arguments: list[t.Term] = []
-                for child in current.arguments:
-                    argument: t.Term = yield steps(child)
-                    arguments.append(argument)
+                arguments = map(read, current.arguments)
                 return substitute(predicate.meaning, dict(zip(predicate.parameters, arguments, strict=True)))
-        parts: list[t.Term] = []
-        for child in current.children:
-            part: t.Term = yield steps(child)
-            parts.append(part)
-        return current.rebuild(tuple(parts)) if parts else current
+        parts = tuple(map(read, current.children))
+        return current.rebuild(parts) if parts else current
 
-    result = run(steps(formula))
+    result = read(formula)
     if missing:
         raise Rejected(*(_missing(v, clause) for v in dict.fromkeys(missing)))
     return conjunction((*dict.fromkeys(widened), result))
