@@ -327,7 +327,8 @@ def test_an_operator_means_the_same_of_every_type(name: t.Builtin, sort: Sort) -
 @pytest.mark.needs_dafny
 def test_dafny_proves_of_every_type_what_an_operator_yields() -> None:
     """In the text that `backends/dafny/modules.py` has for each type, which nothing but Dafny reads."""
-    claims = [t.And(tuple(said_equal(*use) for use in uses(*each))) for each in every_use() if each[1] != NATURAL]
+    asked = [use for use in every_use() if use[1] != NATURAL and not isinstance(OPERATORS[use[0]].dafny, Why)]
+    claims = [t.And(tuple(said_equal(*use) for use in uses(*each))) for each in asked]
     clauses = "\n".join(f"guarantee g{k} ( {show_term(claim, 'rcl')} )" for k, claim in enumerate(claims))
     contract, found = check_text(CONTRACT.replace("guarantee( q )", f"\n{clauses}\n"), "f")
     assert contract is not None, found
