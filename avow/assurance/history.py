@@ -1,4 +1,4 @@
-"""The records that a report keeps of the ledger: all that can count, every refutation, and the newest few of the rest.
+"""The records that a report keeps of the ledger: each that can count, every refutation, and the newest few of the rest.
 
 The records left out change no conclusion: a record with another key than the plan's is of an earlier state, and among
 records with the same result for the same claim that count under the same conditions, the newest counts. The ledger has
@@ -24,29 +24,38 @@ def kept_records(
 ) -> frozenset[str]:
     """The hashes of the records that a report keeps of a ledger, oldest first.
 
-    It keeps every refutation (the newest of those by the same example), and for each claim and method the newest record
-    of each result with the key in `planned` for (obligation, method), and the newest of the others. The records must be
-    as the ledger has them: whether one of them is of an earlier state for another reason than its key may change
-    without the ledger.
+    It keeps every refutation (the newest two of those by the same example), and for each claim and method the newest
+    record of each result with the key in `planned` for (obligation, method), and the newest two of the others, unless a
+    newer one with that key says the same. Of a claim that was refuted it keeps the newest two of each: whether the plan
+    has left out what refuted it depends on what was recorded before. The records must be as the ledger has them:
+    whether one of them is of an earlier state for another reason than its key may change without the ledger.
     """
     digests = {o.id: o.digest for o in obligations}
     answers = Counter((entry.evidence.obligation, entry.evidence.method) for entry in records)
+    refuted = {entry.evidence.obligation for entry in records if _refutes(entry.evidence)}
     kept: set[str] = set()
-    others: Counter[tuple[object, ...]] = Counter()
+    found: Counter[tuple[object, ...]] = Counter()
+    said: set[tuple[object, ...]] = set()
     for entry in reversed(records):
         record = entry.evidence
         asked = record.obligation, record.method
-        if answers[asked] <= OLDER_RECORDS:  # nearly always
-            kept.add(entry.hash)
-            continue
         current = planned.get(asked) == record.key and digests.get(record.obligation) == record.obligation_digest
-        refuting = record.verdict is Verdict.REFUTED or weigh(record).refuted
-        alike = (*asked, *_says(record, refuting)) if current or refuting else asked
-        others[alike] += 1
-        if others[alike] > OLDER_RECORDS:
-            continue
-        kept.add(entry.hash)
+        result = (*asked, record.verdict, record.strength, record.vacuous)
+        alike: tuple[object, ...] = asked
+        most = OLDER_RECORDS
+        if answers[asked] > 1 and (current or _refutes(record)):
+            alike = (*asked, *_says(record, _refutes(record)))
+        if record.obligation not in refuted:
+            most = 1 if current else 0 if result in said else OLDER_RECORDS
+            said |= {result} if current else set()
+        found[alike] += 1
+        if found[alike] <= most:
+            kept.add(entry.hash)
     return frozenset(kept)
+
+
+def _refutes(record: Evidence) -> bool:
+    return record.verdict is Verdict.REFUTED or weigh(record).refuted
 
 
 def _says(record: Evidence, refuting: bool) -> tuple[object, ...]:
