@@ -6,6 +6,7 @@ No record of the ledger gives a grade: the pipeline passes in what the kernel re
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import field
 from enum import StrEnum
@@ -19,6 +20,7 @@ from avow.evidence.status import Status, weigh
 
 if TYPE_CHECKING:
     from avow.assurance.model import ObligationView
+    from avow.evidence.record import Evidence
 
 CALCULUS = "compose"
 """The engine whose proofs come with certificates."""
@@ -107,10 +109,17 @@ def _graded(view: ObligationView, known: Reestablished | None) -> ProofView:
     others = [e for e in proofs if e.backend != CALCULUS]
     if own and not others:
         return ProofView(view.id, ProofGrade.CLAIMED, tuple(sorted({f"{e.tool} {e.tool_version}" for e in own})))
-    tools = {e.tool_told if e.tool_told.startswith(e.backend) else f"{e.backend}: {e.tool_told}" for e in others}
-    tools |= set() if tools else {f"{r.backend}: another claim's proof" for r in view.records}
-    # commas separate the tools in a list
-    return ProofView(view.id, ProofGrade.TOOL_TRUSTED, tuple(sorted(tool.replace(", ", " with ") for tool in tools)))
+    tools = set(map(named, others)) or {f"{r.backend}: another claim's proof" for r in view.records}
+    return ProofView(view.id, ProofGrade.TOOL_TRUSTED, tuple(sorted(tools)))
+
+
+def named(record: Evidence) -> str:
+    """The tool, after the backend that asks it, in plain characters: commas and parentheses separate the tools in a
+    list."""
+    told = " ".join(re.sub(r"[^\w.+'-]", " ", record.tool_told).split())
+    if record.backend == CALCULUS:
+        return f"search by {told}"
+    return told if told.startswith(record.backend) else f"{record.backend}: {told}"
 
 
 def certifiable(proofs: Iterable[ProofView]) -> tuple[ProofView, ...]:

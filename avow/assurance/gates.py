@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
@@ -18,7 +17,7 @@ from avow.assurance.model import DerivationView, Gate, Handled, ObligationView, 
 from avow.assurance.naming import derivation_claim, requirement_claim, short
 from avow.assurance.policy import Demand, Policy
 from avow.assurance.relied import Relied, looked_at
-from avow.assurance.risk_gates import hazards_gate, rates_gate, steps
+from avow.assurance.risk_gates import hazards_gate, rates_gate, remedies, steps
 from avow.base.plain import count, listed
 from avow.base.verdict import Object
 from avow.evidence.claims import Standing
@@ -70,15 +69,12 @@ def gates(
         *rates_gate(facts.policy, requirements, views),
         *_certified(facts, proofs, fresh),
     )
-    known = [g if g.passed or g.suggestions else replace(g, suggestions=(_general(g.id, g.reason),)) for g in found]
+    known = [g if g.passed or g.suggestions else replace(g, suggestions=(_general(g.id),)) for g in found]
     return tuple(sorted(known, key=lambda gate: (gate.passed, 0 if gate.passed else gate.suggestions[0].cost)))
 
 
-def _general(gate: str, reason: str) -> Suggestion:
+def _general(gate: str) -> Suggestion:
     """The next step of a gate if no claim has one of its own: what is wrong first, a better kind of proof last."""
-    if assumed := re.search(r"\w+/assumption/\w+", reason):
-        entry = f"{{obligation: {assumed[0]}, verdict: missing, reason: …, who: …, date: …, expires: …}}"
-        return Suggestion(f"accept the assumption: `accepted: [{entry}]`", cost=5)
     if gate not in _NEXT:
         return Suggestion(_EVIDENCE, cost=30)
     return Suggestion(_NEXT[gate], cost=70 if gate in ("proved", "certified") else -1)
@@ -301,7 +297,7 @@ def _derivations(
         not bad,
         reason or holding,
         names,
-        steps(s for d in bad for name in d.below if name in views for s in _suggestion(views[name])),
+        steps(s for d in bad for s in remedies(d.below, views)),
         let_off,
         "",
         bool(bad) and all(_tool_only(d.below, views) for d in bad),
@@ -331,7 +327,7 @@ def _requirements(
         f"{r.id} is {_standing(r, status[r.id], good)}{f': {_because(causes[r.id])}' if causes[r.id] else ''}"
         for r in bad[:5]
     )
-    found = [s for r in bad for name in causes[r.id] if name in views for s in _suggestion(views[name])]
+    found = [s for r in bad for s in remedies(causes[r.id], views)]
     if any(r.outdated for r in bad):
         found.append(Suggestion("read the sentence against the formula, then run `avow validate`", cost=5))
     if any(r.too_often for r in bad):
@@ -440,7 +436,7 @@ def _gate(
         not bad,
         shown + more if bad else good + pardoned,
         tuple(view.id for view in bad),
-        steps(s for view in bad for s in _suggestion(view)),
+        steps(view.suggestion for view in bad if view.suggestion),
         let_off,
         asks,
         bool(bad) and all(view.status in _TOOL for view in bad),
@@ -456,10 +452,6 @@ def _holding(supported: Sequence[bool], asked: bool, excused: int = 0) -> str:
     if not asked:
         return f"the policy asks nothing of them; {counts}"
     return f"{counts}; {excused} excused by the plan" if excused else counts
-
-
-def _suggestion(view: ObligationView) -> tuple[Suggestion, ...]:
-    return (view.suggestion,) if view.suggestion else ()
 
 
 def suggestion_for(view: ObligationView, facts: Facts, today: date) -> Suggestion | None:

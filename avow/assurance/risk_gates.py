@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from avow.assurance.answers import Level
 from avow.assurance.hazards import HazardView
 from avow.assurance.model import Gate, ObligationView, RequirementView, Suggestion
-from avow.assurance.naming import requirement_claim
+from avow.assurance.naming import requirement_claim, short
 from avow.assurance.policy import CRITICALITIES, Policy
 from avow.assurance.rates import exceeds
 from avow.assurance.standards import StandardView, State
@@ -22,6 +22,16 @@ def steps(found: Iterable[Suggestion]) -> tuple[Suggestion, ...]:
     return tuple({s.text: s for s in sorted(found, key=lambda s: (s.cost, s.text))}.values())[:10]
 
 
+def remedies(names: Iterable[str], views: Mapping[str, ObligationView]) -> Iterator[Suggestion]:
+    """The next steps for claims that fail; an assumption that a person has to accept is named in the plan."""
+    for name in names:
+        if name.startswith("assumption:"):
+            entry = f"{{obligation: {short(name)}, verdict: missing, reason: …, who: …, date: …, expires: …}}"
+            yield Suggestion(f"accept the assumption: `accepted: [{entry}]`", cost=5)
+        elif name in views and (suggestion := views[name].suggestion):
+            yield suggestion
+
+
 def hazards_gate(hazards: Sequence[HazardView], views: Mapping[str, ObligationView]) -> Iterable[Gate]:
     """A gate: each hazard has mitigations, and all of them hold; no gate if no hazard is listed."""
     if not hazards:
@@ -30,12 +40,11 @@ def hazards_gate(hazards: Sequence[HazardView], views: Mapping[str, ObligationVi
     open_ones = [view for view in hazards if view.mitigations and not view.level.holds]
     reasons = [f"{listed([view.hazard.id for view in bare])}: no mitigation"] if bare else []
     reasons += [f"{view.hazard.id}: {view.stands}" for view in open_ones]
-    failing = [views[name] for h in open_ones for name in h.failing if name in views]
-    remedies = [view.suggestion for view in failing if view.suggestion]
+    found = [step for h in open_ones for step in remedies(h.failing, views)]
     if bare:
         where = f"in {bare[0].hazard.span.file}" if bare[0].hazard.span else "with the hazard"
         text = f"name what mitigates {bare[0].hazard.id} under mitigated_by, {where}"
-        remedies.append(Suggestion(text, cost=5))
+        found.append(Suggestion(text, cost=5))
     claims = dict.fromkeys(
         claim for view in open_ones for m in view.mitigations if not m.level.holds for claim in m.claims
     )
@@ -45,7 +54,7 @@ def hazards_gate(hazards: Sequence[HazardView], views: Mapping[str, ObligationVi
         not reasons,
         "; ".join(reasons) or f"{count(len(hazards), 'hazard')} mitigated: {_how_far(hazards)}",
         tuple(claims) or tuple(view.hazard.id for view in bare),
-        steps(remedies),
+        steps(found),
     )
 
 

@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-import re
 from collections import Counter
 from collections.abc import Sequence
 
 from avow.assurance.answers import Assumption, TrustLine
-from avow.assurance.certification import CALCULUS, KernelRun, ProofGrade, ProofView, certifiable
+from avow.assurance.certification import KernelRun, ProofGrade, ProofView, certifiable, named
 from avow.assurance.model import ObligationView
 from avow.base.plain import count, listed
 from avow.evidence.obligation import Kind
-from avow.evidence.record import Evidence
 from avow.evidence.status import Status, weigh
 
 _SAMPLED = (Status.CHECKED, Status.TESTED, Status.MONITORED)
+_TOOLS = 3
+"""Tools that are named, those with the most answers; the others are counted."""
 
 
 def trust_lines(
@@ -46,26 +46,22 @@ def trust_lines(
         lines.append(TrustLine("the calculus", count(len(wanted), "proof"), done, True))
     if kernel.solvers:
         names = " and ".join(f"{name} {version}" for name, version in sorted(kernel.solvers.items()))
-        several = f"{twice} of {len(certified)} answered by two solvers"
+        several = f"{twice} of {len(certified)} answered by two solvers" if certified else "no proof was answered"
         second = several if len(kernel.solvers) > 1 else "no second solver"
         lines.append(TrustLine("solvers", names, second, twice < len(certified) or not twice))
     tools = Counter(tool for proof in proofs for tool in proof.tools)
-    tools.update(_named(r) for v in views for r in v.records if weigh(r).support in _SAMPLED or weigh(r).refuted)
+    tools.update(named(r) for v in views for r in v.records if weigh(r).support in _SAMPLED or weigh(r).refuted)
     if tools:
-        (tool, many), *others = sorted(tools.items())
-        names = listed([f"{tool}: {count(many, 'answer')}", *(f"{tool}: {many}" for tool, many in others)], 3)
+        (tool, many), *others = sorted(tools.items(), key=lambda found: (-found[1], found[0]))
+        told = [f"{count(many, 'answer')} of {tool}", *(f"{many} of {tool}" for tool, many in others)]
+        if rest := others[_TOOLS - 1 :]:
+            told[_TOOLS:] = [f"{sum(many for _, many in rest)} of {count(len(rest), 'other tool')}"]
         shown = sum(v.obligation.kind is Kind.GUARANTEE and v.status.supports for v in views)
-        again = f"{shown - single} of {count(shown, 'guarantee')} that hold"
-        second = f"{again} ha{'s' if shown == 1 else 've'} a second method"
-        lines.append(TrustLine("tools whose answers have no certificate", names, second, True))
+        again = f"{shown - single} of {count(shown, 'guarantee that holds has', 'guarantees that hold have')} "
+        second = f"{again}a second method" if shown else "no guarantee holds"
+        lines.append(TrustLine("tools whose answers have no certificate", ", ".join(told), second, True))
     bare = [a for a in assumptions if not a.owned]
     if bare:
         numbers = listed([a.number for a in bare], 6)
         lines.append(TrustLine("assumptions without an owner", numbers, "nobody keeps them true", True))
     return tuple(lines)
-
-
-def _named(record: Evidence) -> str:
-    """The tool in plain characters: commas and parentheses separate the names in a list."""
-    told = " ".join(re.sub(r"[^\w.+'-]", " ", record.tool_told).split())
-    return f"search by {told}" if record.backend == CALCULUS else told

@@ -269,7 +269,8 @@ def _tool(record: Json) -> str:
     tool, version = record["tool"], record["tool_version"]
     told = version if tool and version.casefold().startswith(tool.casefold()) else f"{tool} {version}".strip()
     told = " ".join(re.sub(r"[^\w.+'-]", " ", told).split())
-    return f"search by {told}" if record["backend"] == "compose" else told
+    asks = record["backend"]
+    return f"search by {told}" if asks == "compose" else told if told.startswith(asks) else f"{asks}: {told}"
 
 
 def _sampled(stratum: Json) -> bool:

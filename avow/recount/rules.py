@@ -164,6 +164,12 @@ def _bound(facts: Facts, match: re.Match[str], block: Block) -> _Numbers:
     return (match[1] if match[1] in found else "; ".join(found) or "no such requirement",)
 
 
+def _other_tools(facts: Facts, _match: re.Match[str], _block: Block) -> _Numbers:
+    """The answers of the tools that are not named, and how many tools these are: all but the three with the most."""
+    left = sorted(facts.tools().values(), reverse=True)[3:]
+    return str(sum(left)), str(len(left))
+
+
 def _confirmed(facts: Facts, _match: re.Match[str], _block: Block) -> _Numbers:
     """The guarantees that hold, and those of them that a second method shows: not those of the deficit."""
     shown = sum(v["status"] in SUPPORTS for v in facts.guarantees)
@@ -393,11 +399,11 @@ RULES = (
     ),
     _rule(
         "q7",
-        r"(?:[(,] ?)([^(),]+): (\d+)(?: answers?)?(?=[,)]| and )",
-        lambda f, m, _b: (m[1], str(f.tools()[m[1].strip()])),
+        r"(?:[(,] ?)(\d+)(?: answers?)? of (?!\d+ other tool)([^(),]+)(?=[,)])",
+        lambda f, m, _b: (str(f.tools()[m[2].strip()]), m[2]),
     ),
     _rule("q7", r"(\d+) of (\d+) guarantees? that hold", _confirmed),
-    _rule("q7", r"· and (\d+) more\)", _whole(lambda f: len(f.tools()) - 3)),
+    _rule("q7", r"(\d+) of (\d+) other tools?\)", _other_tools),
     _rule("q7", r"without an owner \((.*?)(?: and (\d+) more)?\)", _bare),
     _rule("signature", r"assumptions (A\d+ to A\d+)", lambda f, _m, _b: (f"A1 to A{len(f.assumptions)}",)),
     _rule("signature", r"assumption A(\d+)\b", _whole(lambda f: len(f.assumptions))),

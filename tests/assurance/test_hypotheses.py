@@ -56,7 +56,10 @@ def test_an_assumption_wants_a_person() -> None:
     at = proved(facts)
     ends = Hypothesis(HypothesisKind.ASSUMPTION, "agent/assumption/termination", "1" * 64, "the loop ends")
     facts = resting(facts, at, ends)
-    assert conclude(facts).obligation(at).standing is Status.UNSUPPORTED
+    found = conclude(facts)
+    assert found.obligation(at).standing is Status.UNSUPPORTED
+    wanted = "accept the assumption: `accepted: [{obligation: agent/assumption/termination, verdict: missing,"
+    assert {g.id for g in found.gates if any(s.text.startswith(wanted) for s in g.suggestions)} == {"requirements"}
     taken = Finding("agent/assumption/*", Verdict.REFUTED, "seen", "A. Person", facts.today.isoformat(), "2030-01-01")
     assert conclude(replace(facts, accepted=(taken,))).obligation(at).standing is Status.UNSUPPORTED
     taken = replace(taken, verdict="missing")

@@ -9,7 +9,8 @@ from collections.abc import Iterator
 import pytest
 
 from avow.kernel.solvers import BUDGET, Reply
-from avow.solving.apart import Apart
+from avow.solving.apart import Apart, versions
+from avow.solving.checking import z3_version
 
 NEVER = "(declare-fun x () Int)\n(assert (and (> x 0) (< x 1)))\n"
 EVER = "(declare-fun x () Int)\n(assert (> x 0))\n"
@@ -64,3 +65,8 @@ def test_one_that_hangs_is_ended(solver: Apart, monkeypatch: pytest.MonkeyPatch)
     assert solver(NEVER, BUDGET) is Reply.LATE
     assert hanging is not None
     assert hanging.poll() is not None
+
+
+def test_z3_has_one_version() -> None:
+    """A report names the kernel's solvers beside the backends that ask Z3."""
+    assert versions()["z3"] == z3_version()

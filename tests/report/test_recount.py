@@ -142,9 +142,19 @@ def test_any_number_of_tools_is_borne_out(number: int) -> None:
     texts = dict(every_text(make_case(system({"n": ["g"]}), [target], records)))
     page, data = texts["index.html"], texts["report.json"].encode()
     assert recounted(page, data) == []
-    many = f"and {number - 3} more)"
+    assert "0 of 1 guarantee that holds has a second method" in page
+    many = f", {number - 3} of {number - 3} other tool{'s' * (number > 4)})"
     assert (many in page) == (number > 3)
-    assert number < 4 or recounted(page.replace(many, f"and {number - 2} more)"), data) != []
+    for wrong in (
+        many.replace(f"of {number - 3} ", f"of {number - 2} "),
+        many.replace(f", {number - 3} ", f", {number - 2} "),
+    ):
+        assert number < 4 or recounted(page.replace(many, wrong), data) != []
+
+
+def test_where_no_guarantee_holds_none_is_counted_that_has_a_second_method() -> None:
+    page, _ = made("examined")
+    assert 'no certificate <span class="m">(1 answer of hoare: z3 1.0)</span>: no guarantee holds.' in page
 
 
 def test_a_gate_that_the_plan_relaxes_is_named() -> None:
