@@ -375,7 +375,8 @@ class Answers:
     """The owners of the assumptions, and the day on which the first one ends; empty if there are none."""
     weakened_by: str = field(default="", metadata=LATER)
     """The ways in which the case is weakened; empty if there are none."""
-
+    unneeded: str = field(default="", metadata=LATER)
+    """The number of guarantees that are not compared for the weakest evidence; empty if there are none."""
     trusted: tuple[TrustLine, ...] = field(default=(), metadata=LATER)
     """The parts that have to be trusted."""
     failures: tuple[Failure, ...] = field(default=(), metadata=LATER)

@@ -44,7 +44,7 @@ from avow.assurance.closure import Closure
 from avow.assurance.deficits import deficits
 from avow.assurance.facts import Facts, facts_of_case
 from avow.assurance.findings import handle
-from avow.assurance.first_screen import answers, weakest_of, with_signature
+from avow.assurance.first_screen import answers, felled, weakest_of, with_signature
 from avow.assurance.gap import counted, independent, missing_tools
 from avow.assurance.gates import exit_code, gates, grants, suggestion_for
 from avow.assurance.mitigated import hazard_views
@@ -164,7 +164,8 @@ def conclude(facts: Facts) -> Case:
     basis = {n for c in closed.values() for n in c.claims} if closed else set(whole.claims)
     basis |= {n for h in hazards for n in h.closure}
     lost = sorted({n for c in closed.values() for n in c.failing} | {n for h in hazards for n in h.failing})
-    weakest = failing_of((), lost, by_id, titles) or weakest_of(basis, by_id, relied, titles)
+    wrong = [view.id for view in felled(views)][:1]
+    weakest = failing_of(wrong, wrong or lost, by_id, titles) or weakest_of(basis, by_id, relied, titles)
     following = weakest_of(basis - {weakest.claim}, by_id, relied, titles) if weakest else None
     if weakest is not None:
         needing = tuple(r.id for r in requirements if weakest.claim in r.closure)
@@ -181,6 +182,7 @@ def conclude(facts: Facts) -> Case:
         found,
         weakest,
         following,
+        sum(view.obligation.kind is Kind.GUARANTEE and view.id not in basis for view in views),
         trust_lines(proofs, facts.kernel, supposed, views, facts.run.id, len(single)),
         strict=facts.expected is not None,
         passed=code == 0,

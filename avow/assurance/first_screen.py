@@ -101,6 +101,7 @@ def answers(
     gates: Sequence[Gate],
     weakest: WeakestEvidence | None,
     following: WeakestEvidence | None,
+    unneeded: int,
     trusted: tuple[TrustLine, ...],
     *,
     strict: bool,
@@ -150,6 +151,12 @@ def answers(
             else ""
         ),
         refuted=_refuted(requirements, views, nodes),
+        unneeded=(
+            f"{count(unneeded, 'guarantee')} that no requirement or hazard needs "
+            f"{'is' if unneeded == 1 else 'are'} left out of this comparison"
+            if unneeded
+            else ""
+        ),
         supposed=tuple(_lines(assumptions)),
         owned=f"{owned} of {len(assumptions)}" if assumptions else "",
         changed_against="",
@@ -260,26 +267,33 @@ def _mark(view: ObligationView, relied: Mapping[str, Relied]) -> tuple[str, Tone
     return found.status.value, Tone.GREEN if found.status in EXHAUSTIVE else Tone.AMBER
 
 
+def felled(views: Iterable[ObligationView]) -> tuple[ObligationView, ...]:
+    """The refuted claims, the first of each node and of the whole system: a guarantee before the claims that rest on
+    it."""
+    first: dict[str, ObligationView] = {}
+    wrong = (v for v in views if v.status.refuted and not v.advice)
+    for view in sorted(wrong, key=lambda v: (_FELLED.index(v.obligation.kind), v.obligation.node == SYSTEM_LEVEL)):
+        first.setdefault(view.obligation.node, view)
+    worst, others = tuple(first.values())[:1], tuple(first.values())[1:]
+    return (*worst, *sorted(others, key=lambda v: v.obligation.node != SYSTEM_LEVEL))
+
+
 def _refuted(
     requirements: Sequence[RequirementView], views: Sequence[ObligationView], nodes: Sequence[NodeView]
 ) -> str:
-    """The refutations with their counterexamples, and the requirements that do not hold: one for each node and one for
-    the whole system, a guarantee before the claims that rest on it. Empty if nothing is refuted."""
-    wrong = [v for v in views if v.status.refuted and not v.advice]
+    """The refutations with their counterexamples, and the requirements that do not hold. Empty if nothing is
+    refuted."""
+    wrong = sum(v.status.refuted and not v.advice for v in views)
     if not wrong:
         return ""
     titles = {node.name: node.title for node in nodes}
-    first: dict[str, ObligationView] = {}
-    for view in sorted(wrong, key=lambda v: (_FELLED.index(v.obligation.kind), v.obligation.node == SYSTEM_LEVEL)):
-        first.setdefault(view.obligation.node, view)
-    worst, *others = first.values()
-    shown = [worst, *sorted(others, key=lambda v: v.obligation.node != SYSTEM_LEVEL)][:WORST]
+    shown = felled(views)[:WORST]
     told = [
         f"{titles.get(v.obligation.node, 'the whole')}: “{v.obligation.claim.rstrip('.')}”"
         f" ({cut(refutation(v)[1], REASON)})"
         for v in shown
     ]
-    more = f"; and {count(len(wrong) - len(shown), 'more claim')}" if len(wrong) > len(shown) else ""
+    more = f"; and {count(wrong - len(shown), 'more claim')}, {wrong} in all" if wrong > len(shown) else ""
     names = {level: [r.id for r in requirements if r.level is level] for level in (Level.REFUTED, Level.NOT_SHOWN)}
     takes = "".join(f" Requirements {level}: {listed(of, 6)}." for level, of in names.items() if of)
     return "Refuted: " + "; ".join(told) + f"{more}.{takes}"

@@ -2,8 +2,8 @@
 
 If several records support a claim, one is chosen: first one whose assumptions have neither expired nor been refuted,
 then one that is a proof or an exhaustive check, then one of the program itself before one of a model that is no
-stronger, then one whose assumptions all have an owner. A proof of the node's source states assumptions that a proof of
-a model leaves out.
+stronger, then one whose assumptions all have an owner, then of samples the one with the least bound: more evidence
+never makes a claim look weaker. A proof of the node's source states assumptions that a proof of a model leaves out.
 """
 
 from __future__ import annotations
@@ -67,6 +67,7 @@ def relied_upon(view: ObligationView, opinion: Opinion, views: Iterable[Obligati
     ways = []
     records = view.records
     supporting = [(record, status) for record in records if (status := weigh(record).support) is not None]
+    used = max((_placed(record) for record, _ in supporting if RATE in record.details), default=0.0)
     for record, status in supporting:
         outdone = record.of is Object.MODEL and any(
             other.of is not Object.MODEL and rank.rank >= status.rank for other, rank in supporting
@@ -79,7 +80,8 @@ def relied_upon(view: ObligationView, opinion: Opinion, views: Iterable[Obligati
             outdone,
             not all(t.owned for t in thought),
             -status.rank,
-            -(upper_bound(record) or 0.0) if status in SAMPLED else 0.0,  # the requirement's rate counts the worst
+            RATE in record.details and _placed(record) < used,  # the rate counts the worst of the experiments
+            _placed(record) if status in SAMPLED else 0.0,
             agrees(views, view.obligation, record.method) is None,
             len(way.assumptions),
             record.method,
@@ -192,14 +194,16 @@ def judgements(record: Evidence) -> int:
 
 
 def weakness(relied: Relied) -> tuple[int, float, int]:
-    """Sorts the weakest first: by status, then of all samples the greatest bound on failures. A sample without a bound
-    is placed as if its judgements were trials drawn at random, at 95 % confidence: an
-    order, no claim."""
-    bound, many = upper_bound(relied.record), judgements(relied.record)
-    if bound is None:
-        bound = 1 - 0.05 ** (1 / many) if many else 1.0
+    """Sorts the weakest first: by status, then of all samples the greatest bound on failures."""
     sampled = relied.status in SAMPLED
-    return Status.MONITORED.rank if sampled else relied.status.rank, -bound, relied.status.rank
+    return Status.MONITORED.rank if sampled else relied.status.rank, -_placed(relied.record), relied.status.rank
+
+
+def _placed(record: Evidence) -> float:
+    """The bound by which samples are ordered. One without a bound is placed as if its judgements were trials drawn at
+    random, at 95 % confidence: an order, no claim."""
+    bound, many = upper_bound(record), judgements(record)
+    return bound if bound is not None else 1 - 0.05 ** (1 / many) if many else 1.0
 
 
 def bound_of(relied: Relied) -> str:

@@ -93,6 +93,12 @@ class Facts:
         """Findings that the plan speaks of and that support nothing."""
         return sum(bool(v["handled"]) and v["standing"] not in (*SUPPORTS, "argued") for v in self.views)
 
+    def unneeded(self) -> int:
+        """Guarantees beneath no requirement and no hazard; none where no requirement is named."""
+        roots = (*self.requirements, *self.hazards) if self.requirements else ()
+        beneath = {name for root in roots for name in root.get("closure", ())}
+        return sum(_id(v) not in beneath for v in self.guarantees) if roots else 0
+
     def signed(self) -> str:
         """The sentence that was signed, while the case is the signed one."""
         return self.case["baseline"].get("says", "") if self.case["answers"]["signed"].startswith("signed") else ""

@@ -366,6 +366,8 @@ RULES = (
     _rule("q2", rf"(\d+) ({_STATUS})\b", _basis),
     _rule("q2", r"and (\d+) nodes? on no less", _whole(lambda f: len(f.case["nodes"]) - 8)),
     _rule("q3", r"and (\d+) more claims?", _whole(lambda f: len(f.wrong()) - min(3, f.wronged()))),
+    _rule("q3", r"(\d+) in all", _whole(lambda f: len(f.wrong()))),
+    _rule("q3", r"(\d+) guarantees? that no requirement or hazard needs", _whole(Facts.unneeded)),
     _rule("q3", r"(?:Refuted: |; )[^“”]*: “([^”]*\d[^”]*)” \(", _felled),
     _rule("q3", r"On it rests? ([^␟;]*?)(?: and (\d+) more)?(?=\.? $|;)", _listed),
     _rule("q3", r"Requirements (?:refuted|not shown): ([^␟]*?)(?: and (\d+) more)?(?=\. )", _listed),

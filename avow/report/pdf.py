@@ -145,7 +145,8 @@ def _weakest(case: Case) -> str:
     if found is None:
         return "There is no evidence."
     rests = f" On it rest {listed(found.needed_by)}." if found.needed_by else ""
-    return f"{found.title}: “{found.quote}”. {found.words[:1].upper()}{found.words[1:]}.{rests}"
+    left_out = f" {case.answers.unneeded}." if case.answers.unneeded else ""
+    return f"{found.title}: “{found.quote}”. {found.words[:1].upper()}{found.words[1:]}.{rests}{left_out}"
 
 
 def _toned(requirement: RequirementView) -> dict[str, str]:

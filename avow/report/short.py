@@ -83,7 +83,8 @@ def weakest_words(case: Case) -> str:
     if a.weakest is None:
         return "There is none."
     following = f" Next weakest: {a.next_weakest}." if a.next_weakest else ""
-    return f"{a.weakest.title}: “{a.weakest.quote}”: {a.weakest.words}.{following}"
+    left_out = f" {a.unneeded}." if a.unneeded else ""
+    return f"{a.weakest.title}: “{a.weakest.quote}”: {a.weakest.words}.{following}{left_out}"
 
 
 def _next(case: Case) -> str:

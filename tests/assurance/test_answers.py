@@ -50,6 +50,7 @@ from avow.base.verdict import Hypothesis, HypothesisKind, Link, Object, Verdict,
 from avow.evidence.obligation import SYSTEM_LEVEL, Kind, Obligation
 from avow.evidence.record import RATE, Evidence
 from avow.evidence.status import Status
+from avow.report.short import weakest_words
 from avow.system.plan import EnvironmentInput, Hazard, Requirement, Statement, System
 
 NODES = {"a": ["g", "h"], "b": ["g"]}
@@ -511,7 +512,7 @@ def test_each_tool_with_an_answer_that_counts_is_to_be_trusted_and_a_refuted_con
     found = case(system({"a": ["g", "h", "k"]}), [*claims, contract], made).answers
     (line,) = (line for line in found.trusted if line.what == "tools whose answers have no certificate")
     named = sorted(record.tool_told for record in made)  # also one that refutes
-    assert line.which == f"{named[0]}: 1 answer, {named[1]}: 1, {named[2]}: 1 and 1 more"
+    assert line.which == f"1 answer of {named[0]}, 1 of {named[1]}, 1 of {named[2]}, 1 of 1 other tool"
     assert found.based_on[0].words.endswith("; a check of its contract fails")
 
 
@@ -640,6 +641,9 @@ def test_what_rests_on_the_weakest_evidence_and_what_is_the_next() -> None:
     assert {d.key: d.claims for d in proved.deficits}.get("idle") is None
     idle = case(system({"a": ["g", "h"]}, requirements=asked[:1]), node, made)
     assert {d.key: d.claims for d in idle.deficits}["idle"] == (node[1].id,)
+    assert idle.answers.unneeded == "1 guarantee that no requirement or hazard needs is left out of this comparison"
+    assert weakest_words(idle).endswith(f"{idle.answers.unneeded}.")
+    assert (whole.answers.unneeded, proved.answers.unneeded) == ("", "")
     assert {d.key: d.claims for d in whole.deficits}["underrated"] == (node[0].id, node[1].id)
     spilt = case(
         system({"a": ["g", "h"]}, requirements=asked, hazards=[replace(danger, severity="marginal")]), node, made
@@ -659,6 +663,40 @@ def test_what_rests_on_the_weakest_evidence_and_what_is_the_next() -> None:
     assert steps["hazards"] == steps["guarantees-medium"], "one remedy for one claim"
 
 
+def test_more_samples_never_make_a_claim_look_weaker() -> None:
+    """A guarantee stands by its best sample; of experiments, which count for one rate, by the worst."""
+    (target,) = claims = [guarantee("a", "g")]
+
+    def bound(*samples: tuple[str, float, bool]) -> str:
+        records = [
+            evidence(
+                target,
+                Verdict.TESTED,
+                method,
+                bound={"runs": 40, "failure probability at most": most, "confidence": 0.95},
+                details={RATE: []} if counts else {},
+            )
+            for method, most, counts in samples
+        ]
+        made = case(subject(replace(PROSE, supported_by=("a.g",))), claims, records).answers.weakest
+        assert made is not None
+        return made.bound
+
+    assert bound(("hypothesis", 0.128, False), ("experiment", 0.0618, True)) == "bound 6.18 %"
+    assert bound(("hypothesis", 0.02, False), ("experiment", 0.0618, True)) == "bound 2 %"
+    assert bound(("experiment", 0.0618, True), ("experiment-2", 0.1, True)) == "bound 10 %"
+
+
+def test_what_refutes_is_the_weakest_evidence_in_data_and_words() -> None:
+    """Though a claim beneath a requirement is missing."""
+    found = build([evidence(GUARANTEES[1], Verdict.REFUTED), evidence(GUARANTEES[2])], formal=False)
+    assert found.answers.weakest is not None
+    assert found.answers.weakest.claim == GUARANTEES[1].id
+    assert f"“{found.answers.weakest.quote}”" in found.answers.refuted
+    refuted = [evidence(g, Verdict.REFUTED) for g in GUARANTEES]
+    assert build(refuted, formal=False).answers.refuted.partition("; and ")[2].startswith("1 more claim, 3 in all.")
+
+
 def test_a_test_of_too_few_cases_is_no_second_method() -> None:
     """As for the policy's gate: 20 cases are asked."""
     target = guarantee("a", "g")
@@ -668,7 +706,7 @@ def test_a_test_of_too_few_cases_is_no_second_method() -> None:
         found = case(system({"a": ["g"]}, plans=[node_plan("a", "medium", "hoare", "hypothesis")]), [target], made)
         assert ("single" in {d.key for d in found.deficits}) is alone
         (tools,) = [line for line in found.answers.trusted if line.what.startswith("tools")]
-        assert f"{int(not alone)} of 1 guarantee that hold has a second" in tools.mitigation
+        assert f"{int(not alone)} of 1 guarantee that holds has a second" in tools.mitigation
 
 
 def test_every_reason_in_place_of_evidence_is_a_numbered_assumption() -> None:
