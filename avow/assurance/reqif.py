@@ -16,6 +16,7 @@ from xml.etree import ElementTree as ET
 from xml.parsers import expat
 
 from avow.base.diagnostics import Diagnostic, Rejected, Span
+from avow.base.malformed import xml_fault
 from avow.base.plain import bare
 from avow.base.tuning.sizes import REQIF_BYTES
 
@@ -116,10 +117,11 @@ def _parse(data: bytes, file: str) -> ET.Element:
         parser.Parse(data, True)
         return builder.close()
     except expat.ExpatError as error:
-        where = Span(file, error.lineno, error.offset + 1, error.lineno, error.offset + 1)
-        raise Rejected(Diagnostic("REQS003", f"{file} is no XML: {expat.ErrorString(error.code)}", where)) from None
+        wrong = xml_fault(data, error)
+        where = Span(file, wrong.line, wrong.column, wrong.line, wrong.column)
+        raise Rejected(Diagnostic("REQS003", wrong.message, where, hint=wrong.hint)) from None
     except (ValueError, LookupError) as error:  # an encoding that Python does not know
-        raise Rejected(Diagnostic("REQS003", f"{file} is no XML: {error}", Span(file, 1, 1, 1, 1))) from None
+        raise Rejected(Diagnostic("REQS003", f"this is not XML: {error}", Span(file, 1, 1, 1, 1))) from None
 
 
 def _documents(data: bytes, file: str) -> Iterator[tuple[str, bytes]]:

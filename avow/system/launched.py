@@ -15,7 +15,8 @@ from typing import Any
 import yaml
 
 from avow.base.diagnostics import Diagnostic, Severity, Span
-from avow.base.files import inside, read_regular
+from avow.base.files import inside, read_regular, read_text
+from avow.base.malformed import yaml_fault
 from avow.base.plain import count
 from avow.base.suggestions import did_you_mean, nearby, nearest, suggest
 from avow.base.workspace import find_workspace
@@ -34,14 +35,20 @@ def read_launched(plan: Path, pieces: Iterable[Piece]) -> tuple[Launched | None,
     """What the plan's launch files start; None if it names none."""
     faults: list[Diagnostic] = []
     files: list[tuple[Path, dict[str, str]]] = []
+    names: dict[str, Span] = {}
     for piece in pieces:
         if (path := in_workspace(plan, piece.at("file") or piece, faults)) is not None:
             given = piece.at("args")
             entries = (given.entries or {}) if given is not None else {}
             files.append((path, {name: _value(value) for name, value in entries.items()}))
+            names |= {name: given.key_span(name) for name in entries} if given is not None else {}
     if not files and not faults:
         return None, ()
     found = read_launch(files, _root(plan))
+    for name in () if found.unread else names:
+        if name not in found.arguments:
+            hint = suggest(name, found.arguments) or "leave it out: they declare no arguments"
+            faults.append(Diagnostic("PLAN106", f"no launch file has the argument {name!r}", names[name], hint=hint))
     found = replace(found, unread=(*faults, *found.unread))
     return found, tuple(d for d in found.unread if d.is_error)
 
@@ -163,8 +170,10 @@ def started_with(launched: Started) -> tuple[dict[str, tuple[Any, Span]], tuple[
         except (OSError, ValueError, yaml.YAMLError, WrongParameters) as error:
             what = setting.name or os.path.normpath(setting.value or "a file")
             why, near = str(error), None
-            if isinstance(error, yaml.MarkedYAMLError) and error.problem_mark:
-                why = f"line {error.problem_mark.line + 1}: {error.problem}"
+            if isinstance(error, yaml.YAMLError):
+                text = setting.value if setting.name else read_text(Path(setting.value), errors="replace")
+                wrong = yaml_fault(text, error)
+                why, near = f"line {wrong.line}: {wrong.message}", wrong.hint
             elif isinstance(error, OSError):
                 why, near = error.strerror or why, nearby(Path(setting.value))
             message = f"{launched.name} is started with the parameters of {what}, which are not read: {why}"

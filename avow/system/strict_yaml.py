@@ -9,12 +9,12 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
 from typing import Any
 
 import yaml
 
 from avow.base.diagnostics import Diagnostic, Rejected, Span
+from avow.base.malformed import yaml_fault
 from avow.base.plain import invisible
 from avow.base.tuning.sizes import PLAN_BYTES
 from avow.system.pieces import Piece as Piece
@@ -40,76 +40,9 @@ def read_yaml(data: bytes, file: str) -> tuple[Piece, tuple[Diagnostic, ...]]:
     try:
         builder = _Builder(file)
         return builder.build(text), tuple(builder.problems)
-    except yaml.reader.ReaderError as error:
-        line, column = _position(text, int(error.position))
-        shown = f"character U+{ord(text[error.position]):04X}" if error.position < len(text) else "a character"
-        raise Rejected(_error(f"{shown} does not belong in YAML", file, line, column)) from None
-    except yaml.MarkedYAMLError as error:
-        mark, begun = error.problem_mark or error.context_mark, error.context_mark
-        if begun and re.search("flow|simple key|quoted", error.context or ""):
-            mark = begun  # what is not ended is the fault, not the line at which that is noticed
-        line, column = (mark.line + 1, mark.column + 1) if mark else (1, 1)
-        problem, hint = _in_words(error.problem or "not YAML")
-        if undashed := _undashed(text.splitlines(), line - 1):
-            line, problem, hint = undashed + 1, "this line begins no item of the list below", "write `- ` before it"
-        raise Rejected(_error(problem, file, line, column, hint)) from None
-    except yaml.YAMLError:
-        raise Rejected(_error("not YAML", file, 1, 1)) from None
-
-
-def _undashed(lines: Sequence[str], at: int) -> int | None:
-    """The line before line `at` if that one begins an item of a list and this one, in the same column, does not."""
-    before = next((k for k in range(at - 1, -1, -1) if lines[k].strip() and lines[k].lstrip()[0] != "#"), None)
-    if before is None or at >= len(lines) or not lines[at].lstrip().startswith("- "):
-        return None
-    indents = {len(line) - len(line.lstrip()) for line in (lines[before], lines[at])}
-    return before if len(indents) == 1 and not lines[before].lstrip().startswith("-") else None
-
-
-_PROBLEMS = (
-    (r"character '\\t'", "a tab stands where YAML wants spaces", "indent with spaces"),
-    (r"character '(.)'.*cannot start", "no plain text can begin with {0}", "put the text in quotes"),
-    (
-        r"mapping values are not allowed",
-        "a `:` stands where no key can be",
-        "check how this line and the line before are indented, and the space after each `:`; or put the text in quotes",
-    ),
-    (r"could not find expected ':'", "a key without its `:`", "write `key: value`"),
-    (r"expected <block end>, but found '([\]}])'", "a `{0}` closes no bracket", "remove it, or open the bracket"),
-    (
-        r"expected <block end>, but found '(.*)'",
-        "this line is indented as none above it",
-        "the keys of a mapping, and the items of a list, stand in one column: move this line, or those above it",
-    ),
-    (r"expected ',' or '(.)'", "a `,` or the closing `{0}` is missing", None),
-    (r"found another document", "a second document; one file holds one", None),
-    (
-        r"found undefined alias '(.*)'",
-        "the alias `*{0}` is used before or without its anchor",
-        "write the value here, or its anchor above",
-    ),
-    ("second occurrence", "this anchor is given twice", "give one of them another name"),
-    (r"end of stream|document separator|<stream end>", "a quotation mark or a bracket is not closed", None),
-    (
-        r"unknown escape character '(.*)'",
-        "`\\{0}` means nothing in double quotes",
-        "use single quotes, or double the backslash",
-    ),
-    (
-        r"did not find expected|expected the node content|expected <document start>",
-        "something else is expected here",
-        None,
-    ),
-)
-"""PyYAML's message, as a pattern, and the same for people, with a hint."""
-
-
-def _in_words(problem: str) -> tuple[str, str | None]:
-    for pattern, words, hint in _PROBLEMS:
-        found = re.search(pattern, problem)
-        if found:
-            return words.format(*(f"`{part}`" if "{0}`" not in words else part for part in found.groups())), hint
-    return f"not YAML: {problem}", None
+    except yaml.YAMLError as error:
+        found = yaml_fault(text, error)
+        raise Rejected(_error(found.message, file, found.line, found.column, found.hint)) from None
 
 
 def scalar(text: str) -> Any:

@@ -150,9 +150,10 @@ def test_document_types_are_refused_in_any_encoding_and_at_any_place(doctype: st
 
 
 def test_undeclared_entities_are_refused_and_depth_does_no_harm() -> None:
-    refused(EXPORT.replace("first", "&nbsp;").encode(), "no XML")
+    refused(EXPORT.replace("first", "&nbsp;").encode(), "not XML")
     assert read_reqif(EXPORT.replace("first", "<p>" * 100_000 + "first" + "</p>" * 100_000).encode(), "r.reqif")
-    refused(("<a>" * 1_000_000).encode(), "no XML")
+    refused(("<a>" * 1_000_000).encode(), "not XML")
+    refused(b"<a>\n<b>\n</c>\n</a>", "<b> of line 2 is not closed before this")
 
 
 def test_archives_that_lie_or_burst_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:

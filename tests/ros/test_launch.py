@@ -280,6 +280,45 @@ def test_what_is_no_launch_file_is_an_error_and_nothing_worse(tmp_path: Path, na
     assert found.nodes == ()
 
 
+@pytest.mark.parametrize(
+    ("name", "text", "place", "said"),
+    [
+        ("a.launch", "<launch>\n <group>\n </gruop>\n</launch>", (3, 4), "<group> of line 2 is not closed before this"),
+        ("a.launch", '<launch>\n <node name="a">\n</launch>', (3, 3), "<node> of line 2 is not closed before this"),
+        ("a.launch", "<launch>\n <group>", (2, 9), "<group> of line 2 is not closed before this"),
+        ("a.launch", "<launch>\n <node name=a/>\n</launch>", (2, 13), "this cannot stand here"),
+        ("a.launch", '<launch>\n <arg if="a &&"/>\n</launch>', (2, 14), "this cannot stand here"),
+        ("a.launch", "<launch/>\n<launch/>", (2, 1), "a file has only one"),
+        ("a.launch", '<launch>\n <arg a="" a=""/></launch>', (2, 12), "this attribute is given twice"),
+        ("a.launch", "<launch>\n <!-- a", (2, 2), "what begins here has no end"),
+        ("a.launch", "<launch>&nbsp;</launch>", (1, 9), "nothing defines this entity"),
+        ("a.yaml", "launch:\n- arg:\n    name: a\n   default: b\n", (4, 4), "this line is indented as none above it"),
+        ("a.yaml", 'launch:\n- arg: {name: "a}\n- arg: {name: "b"}\n', (2, 15), "closed only on a later line"),
+    ],
+)
+def test_the_first_fault_of_a_launch_file_has_its_place_and_a_remedy(
+    tmp_path: Path, name: str, text: str, place: tuple[int, int], said: str
+) -> None:
+    (fault,) = read(tmp_path, text, name).unread
+    assert (fault.code, said in fault.message) == ("ROS120", True), fault.message
+    assert fault.span is not None
+    assert (fault.span.line, fault.span.column) == place
+    assert fault.hint
+    assert "group" not in text or "write `</group>` here, or end its first tag on line 2" in fault.hint
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ('<nod name="a" pkg="p" exec="a"/>', "did you mean `node`?"),
+        ('<node name="a" pkg="p" exec="a"><remap form="b" to="c"/></node>', "did you mean `from` for `form`?"),
+        ('<arg name="sim"/><node name="a" pkg="p" exec="a" if="$(var smi)"/>', "did you mean `sim`?"),
+    ],
+)
+def test_what_is_misspelt_in_a_launch_file_is_said(tmp_path: Path, text: str, said: str) -> None:
+    assert any(said in f"{d.message} {d.hint}" for d in read(tmp_path, f"<launch>{text}</launch>").unread)
+
+
 @pytest.mark.slow
 def test_files_that_include_one_another_end(tmp_path: Path) -> None:
     text = '<launch><include file="$(dirname)/a.launch"/><include file="$(dirname)/a.launch"/></launch>'

@@ -246,7 +246,12 @@ def test_a_plan_that_is_no_yaml_keeps_no_fault_of_the_contract_back(tmp_path: Pa
         ("nodes:\n  a:\n    b: {}\n    - c: {}\n", "this line begins no item of the list below", 3),
         ("nodes:\n  a: {b: }}\n", "a `}` closes no bracket", 2),
         ("nodes:\n     - a: {}\n    - b: {}\n", "this line is indented as none above it", 3),
-        ('system: "home\n', "a quotation mark or a bracket is not closed", 1),
+        ('system: "home\n', 'begins with this " is closed only on a later line, or never', 1),
+        ("nodes: {}\ntitle: 'home\nros: {}\n", "begins with this ' is closed only on a later line, or never", 2),
+        ('title: "home\nros: {}\nsystem: "a"\n', 'begins with this " is closed only on a later line, or never', 1),
+        ('ros: {a: "home}\nsystem: "a"\n', 'begins with this " is closed only on a later line, or never', 1),
+        ('title: "on two\n  lines"\nsystem: [a\n', "the closing `]` is missing", 3),
+        ("nodes:\n  a:b\n  c: {}\n", "a blank is missing after `a:`", 2),
         ("system: home\n nodes: {}\n", "a `:` stands where no key can be", 2),
         ("system: home\nnodes: [\n", "a quotation mark or a bracket is not closed", 3),
     ],
@@ -262,6 +267,7 @@ def test_what_is_no_yaml_is_told_in_words(text: str, said: str, line: int, tmp_p
     assert fault.span is not None
     assert fault.span.line == line
     assert "no key can be" not in fault.message or "the space after each `:`" in (fault.hint or "")
+    assert "later line" not in fault.message or "close it" in (fault.hint or "")
     assert "indent" not in fault.message or "this line, or those above" in (fault.hint or "")
 
 

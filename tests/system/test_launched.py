@@ -60,6 +60,23 @@ def test_arguments_of_a_launch_file(tmp_path: Path) -> None:
     assert edges(make(tmp_path, plan, launch)) == ["a.x → b.y /left/t"]
 
 
+def test_an_argument_that_no_launch_file_has_is_an_error_with_the_nearest_one(tmp_path: Path) -> None:
+    """Unless a file that is not read may have it."""
+    launch = APART.replace("<launch>", '<launch><arg name="side" default="right"/>')
+    plan = "ros: {launch: [{file: ../../launch/robot.launch, args: {sied: left}}]}"
+    with pytest.raises(Rejected) as found:
+        load_system(make(tmp_path, plan, launch))
+    (fault,) = found.value.diagnostics
+    assert (fault.code, fault.message) == ("PLAN106", "no launch file has the argument 'sied'")
+    assert fault.hint == "did you mean `side`?"
+    assert fault.span is not None
+    assert fault.span.column == plan.index("sied") + 1
+    other = launch.replace("</launch>", '<include file="$(find elsewhere)/a.launch"/></launch>')
+    load_system(make(tmp_path, plan, other))
+    used = launch.replace("</launch>", '<node name="c" pkg="p" exec="c" if="$(var sied)"/></launch>')
+    load_system(make(tmp_path, plan, used))
+
+
 @pytest.mark.parametrize(
     ("plan", "launch", "codes"),
     [

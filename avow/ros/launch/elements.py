@@ -3,12 +3,23 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import field
 
 from avow.base.diagnostics import Diagnostic, Severity, Span
 from avow.base.records import dataclass
-from avow.base.suggestions import nearest
+from avow.base.suggestions import did_you_mean, nearest
+
+HINT = "say what it does under `ros: {nodes: …}`, or give the value as `args` of the launch file in the plan"
+SILENT = frozenset(
+    re.findall(
+        r"\w+",
+        "param rosparam env set_env unset_env set_use_sim_time machine test master log description append_env",
+    )
+)
+"""Elements that start nothing and rename nothing."""
+NODES = ("node", "lifecycle_node", "node_container", "composable_node", "composable_node_container")
+_OTHERS = ("group", "timer", "load_composable_node", "push_ros_namespace", "remap", "include", "set_parameter")
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,6 +46,19 @@ class Element:
         """The first attribute that is present."""
         return next((self.attributes[name] for name in names if name in self.attributes), None)
 
+    def hint(self, *wanted: str) -> str:
+        """What to do about an unknown element, or about one that lacks an attribute: another may be its misspelling."""
+        for key in wanted:
+            if key not in self.attributes and (near := nearest(key, self.attributes, alike=0.75)):
+                return f"did you mean `{key}` for `{near[0]}`?"
+        return (None if wanted else did_you_mean(self.tag, [*NODES, *_OTHERS, *SILENT])) or HINT
+
+    def within(self) -> Iterator[Element]:
+        """It, and all elements in it."""
+        yield self
+        for child in self.children:
+            yield from child.within()
+
 
 @dataclass(slots=True)
 class Parsed:
@@ -43,16 +67,32 @@ class Parsed:
     elements: tuple[Element, ...] = ()
     unread: list[Diagnostic] = field(default_factory=list)
 
+    @property
+    def arguments(self) -> Iterator[str]:
+        """All that are declared, under whichever condition."""
+        names = (each.get("name") for one in self.elements for each in one.within() if each.tag == "arg")
+        return (name for name in names if isinstance(name, str))
+
+    @property
+    def is_ros2(self) -> bool:
+        """Whether it is ROS 2's XML: roslaunch has neither `exec` nor these elements."""
+        return any(
+            {"exec", "namespace"} & e.attributes.keys()
+            or e.tag in ("let", "push_ros_namespace", "set_remap", "node_container", "load_composable_node")
+            or any(
+                isinstance(text, str) and ("$(var " in text or "$(find-pkg" in text) for text in e.attributes.values()
+            )
+            for one in self.elements
+            for e in one.within()
+        )
+
 
 class WrongLaunch(Exception):  # noqa: N818 - it is what was found wrong
-    """A text that is not a launch file; `line` counts from 1."""
+    """A text that is not a launch file; `line` and `column` count from 1."""
 
-    def __init__(self, message: str, line: int) -> None:
+    def __init__(self, message: str, line: int, column: int = 1, hint: str | None = None) -> None:
         super().__init__(message)
-        self.line = line
-
-
-HINT = "say what it does under `ros: {nodes: …}`, or give the value as `args` of the launch file in the plan"
+        self.line, self.column, self.hint = line, column, hint
 
 
 def place(file: str, line: int, column: int = 1) -> Span:
@@ -62,12 +102,6 @@ def place(file: str, line: int, column: int = 1) -> Span:
 def unread(span: Span, message: str, hint: str = HINT) -> Diagnostic:
     """A diagnostic for a part that is not read, with its place."""
     return Diagnostic("ROS121", message, span, Severity.WARNING, hint)
-
-
-def nameless(element: Element) -> str:
-    """The hint for a node without a name: another attribute may be a misspelt `name`."""
-    near = nearest("name", element.attributes, alike=0.75)
-    return f"did you mean `name` for `{near[0]}`?" if near else HINT
 
 
 def literal(text: str) -> Text:

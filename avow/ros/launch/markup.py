@@ -7,6 +7,7 @@ from xml.parsers import expat
 import yaml
 
 from avow.base.diagnostics import Span
+from avow.base.malformed import Fault, xml_fault, yaml_fault
 from avow.base.tuning.sizes import LAUNCH_DEPTH, LAUNCH_ELEMENTS
 from avow.ros.launch.elements import Element, Parsed, Text, WrongLaunch, place, unread
 
@@ -39,7 +40,7 @@ def from_xml(text: str, file: str) -> Parsed:
     try:
         parser.Parse(text, True)
     except expat.ExpatError as error:
-        raise WrongLaunch(f"this is not XML: {expat.ErrorString(error.code)}", error.lineno) from None
+        raise _wrong(xml_fault(text, error)) from None
     if not roots or roots[0].tag != "launch":
         raise WrongLaunch("the outermost element of a launch file is <launch>", 1)
     return Parsed(roots[0].children)
@@ -49,17 +50,20 @@ def from_yaml(text: str, file: str) -> Parsed:
     """Raises WrongLaunch."""
     try:
         root = yaml.compose(text, Loader=yaml.SafeLoader)
-    except yaml.MarkedYAMLError as error:
-        line = error.problem_mark.line + 1 if error.problem_mark else 1
-        raise WrongLaunch(f"this is not YAML: {error.problem}", line) from None
-    except (yaml.YAMLError, RecursionError) as error:
-        raise WrongLaunch(f"this is not YAML: {type(error).__name__}", 1) from None
+    except yaml.YAMLError as error:
+        raise _wrong(yaml_fault(text, error)) from None
+    except RecursionError:
+        raise WrongLaunch("it is nested too deeply", 1) from None
     entries = root.value if isinstance(root, yaml.MappingNode) else []
     top = next((value for key, value in entries if key.value == "launch"), None)
     if top is None:
         raise WrongLaunch("a launch file in YAML begins with `launch:`", 1)
     work = _Yaml(file)
     return Parsed(tuple(work.listed(top, 0)), work.parsed.unread)
+
+
+def _wrong(fault: Fault) -> WrongLaunch:
+    return WrongLaunch(fault.message, fault.line, fault.column, fault.hint)
 
 
 class _Yaml:

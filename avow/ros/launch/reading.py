@@ -17,8 +17,9 @@ from pathlib import Path
 from avow.base.diagnostics import Diagnostic
 from avow.base.files import read_regular, read_text
 from avow.base.records import dataclass
+from avow.base.suggestions import suggest
 from avow.base.tuning.sizes import LAUNCH_BYTES, LAUNCH_DEPTH, LAUNCH_ELEMENTS, PACKAGES_SEARCHED
-from avow.ros.launch.elements import HINT, Element, Parsed, Text, Unread, WrongLaunch, nameless, place, unread
+from avow.ros.launch.elements import HINT, NODES, SILENT, Element, Parsed, Text, Unread, WrongLaunch, place, unread
 from avow.ros.launch.overrides import overrides
 from avow.ros.launch.python import from_python
 from avow.ros.launch.started import Launched, Setting, Started, with_server
@@ -32,7 +33,7 @@ def read_launch(files: Iterable[tuple[Path, Mapping[str, str]]], root: Path) -> 
     for path, given in files:
         work.file(path.resolve(), dict(given), None)
     nodes = tuple(with_server(node, k, work.server) for k, node in enumerate(work.nodes))
-    return Launched(nodes, tuple(dict.fromkeys(work.unread)), tuple(work.files))
+    return Launched(nodes, tuple(dict.fromkeys(work.unread)), tuple(work.files), tuple(work.arguments))
 
 
 class _Unknown(Exception):  # noqa: N818 - it says what was found
@@ -73,24 +74,6 @@ class _Scope:
         self.namespace, self.remaps = inner.namespace, inner.remaps
 
 
-_SILENT = frozenset(
-    [
-        "param",
-        "rosparam",
-        "env",
-        "set_env",
-        "unset_env",
-        "set_use_sim_time",
-        "machine",
-        "test",
-        "master",
-        "log",
-        "description",
-        "append_env",
-    ]
-)
-"""Elements that start nothing and rename nothing."""
-_NODES = ("node", "lifecycle_node", "node_container", "composable_node", "composable_node_container")
 _SUBSTITUTION = re.compile(r"\$\(([^$()]*)\)")
 
 
@@ -100,6 +83,7 @@ class _Reading:
     nodes: list[Started] = field(default_factory=list)
     unread: list[Diagnostic] = field(default_factory=list)
     files: dict[Path, None] = field(default_factory=dict)
+    arguments: dict[str, None] = field(default_factory=dict)
     server: list[tuple[int, Setting]] = field(default_factory=list)
     """ROS 1: parameters outside of nodes, by their whole names, and how many nodes come before each."""
     count: int = 0
@@ -111,10 +95,12 @@ class _Reading:
         try:
             parsed = _parsed(path)
         except WrongLaunch as wrong:
-            self.unread.append(Diagnostic("ROS120", f"{path.name}: {wrong}", place(str(path), wrong.line)))
+            at = place(str(path), wrong.line, wrong.column)
+            self.unread.append(Diagnostic("ROS120", f"{path.name}: {wrong}", at, hint=wrong.hint))
             return False
         self.unread += parsed.unread
-        ros1 = path.suffix not in (".py", ".yaml", ".yml") and not _is_ros2(parsed.elements)
+        self.arguments |= dict.fromkeys(parsed.arguments)
+        ros1 = path.suffix not in (".py", ".yaml", ".yml") and not parsed.is_ros2
         ros1 = ros1 and (outer is None or outer.ros1)
         if outer is None:
             scope = _Scope(path, ros1, 0, args={} if ros1 else dict(given), given=given)
@@ -143,7 +129,7 @@ class _Reading:
             return
         doubt = scope.doubt if started is True else (*scope.doubt, started)
         match element.tag:
-            case tag if tag in _NODES:
+            case tag if tag in NODES:
                 self.node(element, replace(scope, doubt=doubt))
             case "group":
                 inner = replace(scope.inner(), doubt=doubt)
@@ -182,10 +168,10 @@ class _Reading:
                 set_ = self.setting(replace(element, attributes=rest), scope, started)
                 set_ = replace(set_, value="", within="/") if scope.lost else replace(set_, within=at or "/")
                 self.server.append((len(self.nodes), set_))
-            case tag if tag in _SILENT:
+            case tag if tag in SILENT:
                 pass
             case tag:
-                self.tell(element, f"<{tag}> is not read")
+                self.tell(element, f"<{tag}> is not read", element.hint())
 
     def condition(self, element: Element, scope: _Scope) -> bool | str:
         """Whether the element applies; a text (the reason) if that depends on an unknown value."""
@@ -224,7 +210,7 @@ class _Reading:
                 raise _Unknown(started)
             old, new = (self.name(_wanted(element, key), scope, "a remapping") for key in ("from", "to"))
         except _Unknown as why:
-            self.tell(element, f"the remapping is not known: {why}")
+            self.tell(element, f"the remapping is not known: {why}", element.hint("from", "to"))
             scope.doubt = (*scope.doubt, f"a remapping is not known ({why})")
             return
         if scope.ros1:  # the later one takes precedence
@@ -305,7 +291,7 @@ class _Reading:
         text = name if name is not None else element.get("name")
         if text is None:
             message = "the node has no name here, and the name that its program gives is not known"
-            self.tell(element, message, nameless(element))
+            self.tell(element, message, element.hint("name"))
         elif not scope.lost:
             try:
                 whole = _within(scope.namespace, self.name(text, scope).lstrip("/"))
@@ -414,9 +400,11 @@ class _Reading:
         argument = rest[0].strip("'\"") if rest else ""
         match word:
             case "arg" | "var":
+                self.arguments[argument] = None
                 value = scope.args.get(argument)
                 if value is None:
-                    raise _Unknown(f"no argument {argument!r} is declared here")
+                    near = suggest(argument, scope.args)
+                    raise _Unknown(f"no argument {argument!r} is declared here" + (f" ({near})" if near else ""))
                 if isinstance(value, Unread):
                     raise _Unknown(value.why)
                 if "$(" in value:
@@ -473,18 +461,6 @@ def _parsed(path: Path) -> Parsed:
             return from_yaml(text, str(path))
         case _:  # XML: .launch, .xml, or no suffix at all
             return from_xml(text, str(path))
-
-
-def _is_ros2(elements: Iterable[Element]) -> bool:
-    """Whether it is ROS 2's XML: roslaunch has neither `exec` nor these elements."""
-    return any(
-        "exec" in e.attributes
-        or "namespace" in e.attributes
-        or e.tag in ("let", "push_ros_namespace", "set_remap", "node_container", "load_composable_node")
-        or any(isinstance(text, str) and ("$(var " in text or "$(find-pkg" in text) for text in e.attributes.values())
-        or _is_ros2(e.children)
-        for e in elements
-    )
 
 
 def _packages(root: Path) -> Iterator[tuple[str, Path]]:

@@ -44,11 +44,12 @@ class Setting:
 @dataclass(frozen=True, slots=True)
 class Launched:
     """The nodes that some launch files start. `unread`: the places that cannot be read statically; `files`: all files
-    that were read."""
+    that were read; `arguments`: those that they declare or refer to."""
 
     nodes: tuple[Started, ...] = ()
     unread: tuple[Diagnostic, ...] = ()
     files: tuple[Path, ...] = ()
+    arguments: tuple[str, ...] = ()
 
     @property
     def is_broken(self) -> bool:
