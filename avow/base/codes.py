@@ -11,7 +11,7 @@ from collections.abc import Iterator, Mapping
 from functools import cache, cached_property
 from typing import Any
 
-from avow.base.diagnostics import Severity
+from avow.base.diagnostics import Diagnostic, Severity
 from avow.base.packaged import packaged
 from avow.base.records import dataclass
 
@@ -78,11 +78,16 @@ LANGUAGE = "The language"
 """The section with the codes of contracts."""
 
 
+_CATALOGUES: list[Mapping[str, Code]] = []
+"""Of the backends that are loaded."""
+
+
 class Catalogue(Mapping[str, Code]):
     """The codes that the ``codes.yaml`` of a package declares, read when first needed."""
 
     def __init__(self, package: str) -> None:
         self._package = package
+        _CATALOGUES.append(self)
 
     @cached_property
     def _codes(self) -> Mapping[str, Code]:
@@ -122,6 +127,14 @@ def sections() -> Mapping[str, Mapping[str, Code]]:
 def core_codes() -> Mapping[str, Code]:
     """The codes of the core; a backend's own are in its attribute `codes`."""
     return register(*(code for codes in sections().values() for code in codes.values()))
+
+
+def advice(found: Diagnostic) -> str:
+    """What to do about a finding: its hint, otherwise the remedy of its code. Empty for a note without a hint."""
+    if found.hint or found.severity is Severity.NOTE:
+        return found.hint or ""
+    text = next((codes[found.code].remedy for codes in (core_codes(), *_CATALOGUES) if found.code in codes), "")
+    return (text[:1].lower() if text[1:2].islower() else text[:1]) + text[1:].removesuffix(".")
 
 
 def is_lint(code: str) -> bool:

@@ -14,7 +14,7 @@ from pathlib import Path, PurePath
 from typing import Any
 from urllib.parse import quote
 
-from avow.base.codes import Code, core_codes
+from avow.base.codes import Code, advice, core_codes
 from avow.base.diagnostics import Diagnostic, Severity, Span
 from avow.base.plain import count
 from avow.base.records import dataclass
@@ -84,8 +84,8 @@ def _block(diagnostic: Diagnostic, lines: _Lines, colour: bool) -> str:
             out.append(f"{margin} {bar}")
             out.append(f"{paint(str(span.line), '34')} {bar} {shown}")
             out.append(f"{margin} {bar} {' ' * indent}{paint('^' * length, tint)}")
-    if diagnostic.hint:
-        out.append(f"{margin} = {paint('help', '1')}: {printable(diagnostic.hint)}")
+    if told := advice(diagnostic):
+        out.append(f"{margin} = {paint('help', '1')}: {printable(told)}")
     for text, place in diagnostic.notes:
         where = f" ({printable(str(place))})" if place is not None else ""
         out.append(f"{margin} = {paint('note', '1')}: {printable(text)}{where}")
@@ -163,7 +163,7 @@ def told(diagnostics: Iterable[Diagnostic]) -> CheckDocument:
 
 
 def _shown(d: Diagnostic) -> ShownDiagnostic:
-    s, said = d.span, (d.severity, d.code, d.message, d.hint)
+    s, said = d.span, (d.severity, d.code, d.message, advice(d) or None)
     if s is None:
         return ShownDiagnostic(None, None, None, None, None, *said)
     return ShownDiagnostic(s.file, s.line, s.column, s.end_line, s.end_column, *said)
@@ -201,7 +201,7 @@ def to_sarif(
 
 
 def _as_result(diagnostic: Diagnostic, rule: int) -> dict[str, Any]:
-    text = diagnostic.message + (f" ({diagnostic.hint})" if diagnostic.hint else "")
+    text = diagnostic.message + (f" ({told})" if (told := advice(diagnostic)) else "")
     result: dict[str, Any] = {
         "ruleId": diagnostic.code,
         "ruleIndex": rule,

@@ -8,6 +8,7 @@ from typing import Any
 
 from lsprotocol import types
 
+from avow.base.codes import advice
 from avow.base.diagnostics import Diagnostic, Severity, Span
 from avow.language.contract import ClauseKind
 from avow.language.source import Source
@@ -86,7 +87,7 @@ def diagnostic(found: Diagnostic, document: Document, lines: Lines) -> types.Dia
     arguments: dict[str, Any] = {"related_information": related} if related else {}
     return types.Diagnostic(
         range=lines.of_span(found.span or nowhere),
-        message=found.message + (f"\n{found.hint}" if found.hint else ""),
+        message="\n".join(filter(None, (found.message, advice(found)))),
         severity=SEVERITIES[found.severity],
         code=found.code,
         source="avow",

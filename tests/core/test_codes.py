@@ -12,8 +12,10 @@ import pytest
 from helpers import nodes, parsed
 
 from avow.backend_kit.registry import backend, names
-from avow.base.codes import LANGUAGE, Code, core_codes, declare, register, sections
-from avow.base.diagnostics import Severity
+from avow.base.codes import LANGUAGE, Code, advice, core_codes, declare, register, sections
+from avow.base.diagnostics import Diagnostic, Severity
+from avow.base.rendering import render, to_sarif, told
+from avow.language.load import check_text
 from avow.system.strict_yaml import read_yaml
 
 ROOT = Path(__file__).parents[2]
@@ -69,6 +71,20 @@ def severities(modules: Iterable[tuple[Path, ast.Module]]) -> dict[str, int]:
                 if code is not None:
                     found[code] = max(found.get(code, 0), *said, 2 if not said else 0)
     return found
+
+
+def test_every_error_and_warning_says_what_to_do() -> None:
+    """A diagnostic without a hint shows its code's remedy. A code has none only if its diagnostics have hints."""
+    loaded = declared()
+    for code in loaded.values():
+        found = [d for d in check_text(code.text, "f")[1] if d.code == code.code] if code.code[:3] == "RCL" else []
+        assert code.remedy or (found and all(d.hint for d in found)), code.code
+    bare = [Diagnostic(code.code, "so it is") for code in loaded.values() if code.remedy]
+    assert render(bare).count("= help: ") == len(bare)
+    (shown,) = told([Diagnostic("MON203", "so it is")]).diagnostics
+    assert shown.hint == "record it again, or export JSON lines"
+    assert "(record it again" in str(to_sarif([Diagnostic("MON203", "so it is")]))
+    assert advice(Diagnostic("MON203", "so it is", severity=Severity.NOTE)) == ""
 
 
 def backends() -> dict[str, dict[str, Code]]:

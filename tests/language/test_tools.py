@@ -106,7 +106,7 @@ def test_check_of_a_system_reads_its_plan(tmp_path: Path) -> None:
     code, output = invoke("check", str(tmp_path))
     assert code == 2
     assert "p.imp" in output
-    assert output.count("RCL405") == 1
+    assert output.count("warning[RCL405]") == 1
     assert invoke("check", str(tmp_path / "plan.yaml")) == (code, output)
     (tmp_path / "p.imp").write_text("IF (r > 0) THEN b := TRUE ELSE b := FALSE ENDIF")
     code, output = invoke("check", str(tmp_path))
