@@ -244,7 +244,7 @@ def _accepted(facts: Facts, views: Sequence[ObligationView], closed: Mapping[str
         said = Statement(hypothesis.name)
         if given is not None:
             reason, who, until, made = (s or "" for s in (given.reason, given.who, given.expires, given.date))
-            said = Statement(hypothesis.name, "", reason, who, until, made)
+            said = Statement(hypothesis.name, given.says, reason, who, until, made)
         text = hypothesis.text or hypothesis.name
         yield _Raw(Sort.MODELS, hypothesis.name, text, said, claim, holders.__contains__)
 

@@ -178,6 +178,7 @@ def facts_of_case(case: Case) -> Facts:
                 f.method or None,
                 matched=f.matched,
                 found=f.found,
+                says=f.says,
             ),
         )
         for f in case.findings

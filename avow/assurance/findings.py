@@ -84,6 +84,7 @@ def _match(
         unlisted=tuple(o.local_id for o in alike if o.id not in taken),
         found=finding.found,
         now=now,
+        says=finding.says,
     )
 
 

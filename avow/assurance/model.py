@@ -146,6 +146,8 @@ class Handled:
     """The mark of the finding that is meant, as the plan records it; empty: any finding."""
     now: str = field(default="", metadata=codec.LATER)
     """The mark of the present finding, if the plan has another or none: a finding with another mark is not handled."""
+    says: str = field(default="", metadata=codec.LATER)
+    """An accepted assumption in plain words."""
 
 
 @dataclass(frozen=True, slots=True)

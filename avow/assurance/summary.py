@@ -6,11 +6,12 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
 from avow.assurance.facts import Facts
+from avow.assurance.findings import takes
 from avow.assurance.model import Currency, DerivationView, Handled, ObligationView, OpenItem, RequirementView
 from avow.assurance.naming import derivation_claim, requirement_claim, short
 from avow.assurance.state import ended
 from avow.base.plain import count, listed
-from avow.base.verdict import Object
+from avow.base.verdict import Object, Verdict
 from avow.evidence.record import CASE, Evidence
 from avow.evidence.status import Status, weigh
 
@@ -79,7 +80,7 @@ def open_items(
         if f.expired:
             text = f"{f.how} by {f.who or 'nobody'} until {f.expires}: {f.reason}"
             items.append(OpenItem("expired", f.pattern, text))
-        elif f.how == "accepted" and not f.obligations and not f.now:
+        elif f.how == "accepted" and not (f.obligations or f.now or f.verdict == Status.NOT_RUN or _used(f, views)):
             items.append(
                 OpenItem("unused", f.pattern, f"accepted as {f.verdict}, but nothing is so: remove it", advice=True)
             )
@@ -97,6 +98,14 @@ def open_items(
         if view.advice and view.status in (Status.REFUTED, Status.UNKNOWN, Status.ERROR)
     ]
     return tuple(items)
+
+
+def _used(accepted: Handled, views: Sequence[ObligationView]) -> bool:
+    """Whether evidence rests on an assumption that is accepted, or may once a method of its node has run."""
+    own = [view for view in views if accepted.pattern.startswith(f"{view.obligation.node}/assumption/")]
+    supposed = [h.name for view in own for record in view.records for h in record.rests_on]
+    missing = any(record.verdict is Verdict.NOT_RUN for view in own for record in view.records)
+    return missing or any(takes(accepted.pattern, accepted.matched, name) for name in supposed)
 
 
 def _failed_attempts(views: Sequence[ObligationView]) -> Iterable[OpenItem]:

@@ -76,8 +76,9 @@ def least(asked: Probability, found: Sequence[Likely]) -> Fraction:
 
 
 def made_of(found: Sequence[Likely]) -> str:
-    """``detector.seen 0.9995 of each step and tracker.keeps 0.99 of each run``."""
-    return listed([f"{leaf.claim} with {leaf.least} in each {leaf.trial}" for leaf in found], 6)
+    """``tracker.keeps with 0.99 in each step and tracker.seen with 0.9 in each step; tracker.seen costs most``."""
+    each = listed([f"{leaf.claim} with {leaf.least} in each {leaf.trial}" for leaf in found], 6)
+    return f"{each}; {min(found, key=lambda leaf: Fraction(leaf.least)).claim} costs most"
 
 
 def text(value: Fraction) -> str:

@@ -85,11 +85,7 @@ def unshown(frame: Frame, requirement: Requirement) -> str:
         return str(why)
     if shown >= Fraction(asked.at_least):
         return ""
-    most = min(each, key=lambda leaf: Fraction(leaf.least))
-    return (
-        f"the guarantees give at least {chance.text(shown)}, and {asked.at_least} is asked: {chance.made_of(each)}; "
-        f"{most.claim} costs most"
-    )
+    return f"the guarantees give at least {chance.text(shown)}, and {asked.at_least} is asked: {chance.made_of(each)}"
 
 
 def requirement_question(

@@ -356,6 +356,8 @@ class Finding:
     """If `obligation` has wildcards: what it matched when it was written, and matches now."""
     found: str = ""
     """The mark of the finding when it was written: the entry accepts that finding, and no other of the claim."""
+    says: str = ""
+    """An accepted assumption in plain words."""
 
 
 def is_wild(pattern: str) -> bool:

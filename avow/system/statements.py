@@ -108,6 +108,8 @@ def wrong_words(place: str, piece: Piece) -> Iterator[Diagnostic]:
         if part is None:
             continue
         text = " ".join(part.text.split())
+        if key == "says":
+            yield from _not_plain(place, text, part.span)
         if key == "who":
             wrong = f"{text!r} names no person: {why}" if (why := unreadable(text)) else ""
         elif key in ("says", "because", "reason"):
@@ -118,6 +120,16 @@ def wrong_words(place: str, piece: Piece) -> Iterator[Diagnostic]:
             wrong = f"{key} is before the date of the entry"
         if wrong:
             yield Diagnostic("PLAN105", f"{place}: {wrong}", part.span)
+
+
+def _not_plain(place: str, text: str, span: Span) -> Iterator[Diagnostic]:
+    number = len(text.split())
+    if number > STATEMENT_WORDS:
+        message = f"{place}: says has {number} words; at most {STATEMENT_WORDS} fit a report's first screen"
+        yield Diagnostic("PLAN115", message, span, hint="the whole reason is for  because")
+    if names := identifiers(text):
+        message = f"{place}: says is for readers who do not know the contract, but names {', '.join(names)}"
+        yield Diagnostic("PLAN115", message, span, hint="say it in words")
 
 
 def _has_fixed_words(place: str) -> bool:
@@ -154,16 +166,6 @@ def _places(root: Piece) -> Iterator[tuple[str, str, Piece]]:
 
 def _statement(place: str, keys: str, piece: Piece, faults: list[Diagnostic]) -> Statement:
     texts = piece.words()
-    says = piece.at("says")
-    if says is not None:
-        number = len(texts["says"].split())
-        if number > STATEMENT_WORDS:
-            message = f"{keys}: says has {number} words; at most {STATEMENT_WORDS} fit a report's first screen"
-            faults.append(Diagnostic("PLAN115", message, says.span, hint="the whole reason is for  because"))
-        names = identifiers(texts["says"])
-        if names:
-            message = f"{keys}: says is for readers who do not know the contract, but names {', '.join(names)}"
-            faults.append(Diagnostic("PLAN115", message, says.span, hint="say it in words"))
     faults += wrong_words(keys, piece)
     words = {key: texts.get(key, "") for key in ("says", "because", "who", "until", "date")}
     ends = piece.at("until")

@@ -64,8 +64,13 @@ def test_an_assumption_wants_a_person() -> None:
     assert conclude(replace(facts, accepted=(taken,))).obligation(at).standing is Status.UNSUPPORTED
     taken = replace(taken, verdict="missing")
     assert conclude(replace(facts, accepted=(taken,))).obligation(at).standing is Status.UNSUPPORTED
-    taken = replace(taken, matched=(ends.name,))
-    assert conclude(replace(facts, accepted=(taken,))).obligation(at).standing is Status.JUSTIFIED
+    taken = replace(taken, matched=(ends.name,), says="The loop ends")
+    found = conclude(replace(facts, accepted=(taken,)))
+    assert found.obligation(at).standing is Status.JUSTIFIED
+    assert "The loop ends" in [a.words for a in conclude(facts_of_case(found)).assumptions]
+    assert "unused" not in [item.kind for item in found.open_items]
+    unused = conclude(replace(facts, accepted=(replace(taken, obligation="mem/assumption/other", matched=()),)))
+    assert "unused" in [item.kind for item in unused.open_items]
 
 
 def test_what_rests_on_a_limit_is_checked_at_most() -> None:

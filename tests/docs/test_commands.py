@@ -134,6 +134,7 @@ ELSEWHERE = {
     "avow worker": "tests/scale/test_cluster.py",
     "colcon ": "tests/docs/test_adoption_kit.py builds the package and runs its test",
     "dask ": "tests/scale/test_cluster.py starts one",
+    "doit verify:delivery_robot": "tests/systems/test_delivery_robot.py",
     "doit verify:nasa_rover": "tests/systems/test_nasa_rover.py",
     "eval ": "test_the_shell_completes_commands",
     "export ": "tests/scale/test_cluster.py sets them",

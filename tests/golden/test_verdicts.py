@@ -42,6 +42,9 @@ STEPS = [4, pytest.param(1, marks=pytest.mark.nightly)]
 
 
 @pytest.mark.needs_dafny
+@pytest.mark.needs_perception
+@pytest.mark.needs_chance
+@pytest.mark.needs_motion
 @pytest.mark.skipif(not all(map(shutil.which, ("clang", "strace"))), reason="verdicts of fuzz and Dafny need them")
 def test_shipped_systems(tmp_path: Path) -> None:
     """Statuses of all claims, and the verdict of each method that counts. AJPF, which few machines have, is hidden.

@@ -313,6 +313,13 @@ def test_plain_words_owners_and_dates_are_checked(tmp_path: Path, entry: str, co
     assert fault.span.line == 2
 
 
+def test_an_accepted_assumption_has_plain_words(tmp_path: Path) -> None:
+    text = "accepted:\n  - {obligation: a/assumption/b, verdict: missing, reason: r, who: A. Person, date: 2026-11-20, "
+    text += "expires: 2030-01-01, says: what in.x gives}\n"
+    (fault,) = faults(tmp_path, text)
+    assert (fault.code, "in.x" in fault.message) == ("PLAN115", True), fault
+
+
 ACCEPTED = {"reason": "a spare brake", "who": "A. Person", "date": "2026-11-20", "expires": "2030-01-01"}
 VALIDATION = {"who": "A. Person", "date": "2026-11-20"}
 SIGNED: dict[str, tuple[str, dict[str, str]]] = {

@@ -19,7 +19,7 @@ def test_the_delayed_system_is_the_published_one_to_the_byte() -> None:
 
 
 def test_the_code_knows_no_system() -> None:
-    words = ("jackal", "radiation", "waypoint", "remote_inspection", "nasa_rover")
+    words = ("jackal", "radiation", "waypoint", "remote_inspection", "nasa_rover", "delivery_robot")
     known = [
         f"{path.relative_to(ROOT)}: {word}"
         for folder in ("avow", "backends")

@@ -1,8 +1,0 @@
-class Guard:
-    def step(self, contrast: float) -> dict[str, object]:
-        return {"outside": contrast < 0.25}
-
-
-class Planner:
-    def step(self, seen: bool, outside: bool) -> dict[str, object]:
-        return {"stop": seen or outside}
