@@ -25,6 +25,7 @@ from avow.ros.drafting import Given, by_names, draft, is_plumbing, watch
 from avow.ros.listing import EVERY_SIDE, Listed, Listing, NoListing, parse_listing
 from avow.ros.master import ask_master
 from avow.ros.names import is_name
+from avow.ros.quality import printed, recorded
 from avow.ros.sources import DISTRIBUTIONS, definitions, require
 
 _MASTER = re.compile(r"https?://[^/\s]+/?\Z|ros1\Z")
@@ -67,6 +68,7 @@ def draft_system(
             ros2=found.ros2,
             unsaid=unsaid,
             traces={f"traces/{bag.name}": digest_trace(bag)},
+            ends=recorded(bag) if found.ros2 else (),
         )
         origins.append(bag.name)
     assert listing is not None
@@ -80,7 +82,8 @@ def draft_system(
         raise Rejected(Diagnostic("CLI011", f"{' and '.join(origins)}: no node has a topic", hint=hint))
     given = replace(given, messages=_own_types(listing, known, base))
     graph_file = "models/rosgraph.txt" if graph is not None else None
-    given = replace(given, listing=replace(listing, qos=qos), origin=" and ".join(origins), graph=graph_file)
+    ends = (*given.ends, *(printed(qos) if qos else ()))
+    given = replace(given, listing=replace(listing, qos=qos), ends=ends, origin=" and ".join(origins), graph=graph_file)
     made = draft(given)
     if made.unknown:
         text = f"not known: {', '.join(made.unknown)}; the topics of these types have no ports: draft again with"

@@ -18,6 +18,7 @@ from avow.ros.bags import message_of
 from avow.ros.calls import is_part, named, pairing
 from avow.ros.definitions import FLOATS, INTEGERS, Array, Definitions, Message, Nested, Scalar, Wire, definition_file
 from avow.ros.listing import Listed, Listing
+from avow.ros.quality import Recorded
 
 Path = tuple[str, ...]
 
@@ -99,6 +100,8 @@ class Given:
     seen: Mapping[tuple[str, Path], Seen] = field(default_factory=dict)
     unsaid: frozenset[str] = frozenset()
     """Nodes that are drafted as publishers without the record's confirmation."""
+    ends: tuple[Recorded, ...] = ()
+    """Publishers and subscribers with their quality of service."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -283,8 +286,23 @@ class _Draft:
         lines += self.side("inputs", heard) + self.side("outputs", published)
         topics = [*self.topics(heard, "in"), *self.topics(published, "out")]
         lines.append("  topics(" + ("\n    " + ",\n    ".join(topics) + "\n  )" if topics else " )"))
+        offered = {self.deadline(topic, True, node.name) for topic in published}
+        if len(offered) == 1 and (least := offered.pop()):
+            lines.append(f"  // steps( at most {least} )  as it offers this deadline on all that it publishes")
+        for topic, port in ((topic, self.ports[topic][0]) for topic in heard if self.ports[topic]):
+            if asked := self.deadline(topic, False, node.name):
+                formula = f"( once[{asked}](arrived(in.{port.name})) )"
+                lines.append(f"  // assume alive_{port.name} {formula}  as it requests this deadline of {topic}")
         lines.append('  guarantee to_write "What this node promises is still to be written" ( TRUE )')
         return "\n".join([*lines, "}", ""])
+
+    def deadline(self, topic: str, publishes: bool, node: str = "") -> str:
+        """The shortest deadline of the node's end (or of any) of a topic, as a length of time; empty if there is
+        none."""
+        ends = (e for e in self.given.ends if (e.topic, e.publishes) == (topic, publishes) and e.quality.deadline)
+        known = [e.quality.deadline or math.inf for e in ends if not node or e.node in ("", node)]
+        least = min(known, default=math.inf)
+        return "" if least == math.inf else f"{least * 1000:.6f}".rstrip("0").rstrip(".") + " ms"
 
     def side(self, word: str, topics: Iterable[str]) -> list[str]:
         ports = [port for topic in topics for port in self.ports[topic]]
@@ -340,9 +358,14 @@ class _Draft:
             return []
         return [
             "# environment:                         # what no node publishes: what may be assumed of it, and why",
-            *(f'#   in.{name}: {{assume: "…", because: "…"}}  # {topic}' for topic, name in ports),
+            *(f"#   in.{name}: {{assume: {self.assumed(topic, name)}}}  # {topic}" for topic, name in ports),
             "",
         ]
+
+    def assumed(self, topic: str, name: str) -> str:
+        offered = self.deadline(topic, True)
+        formula = f"once[{offered}](arrived(in.{name}))" if offered else "…"
+        return f'"{formula}", because: "{"its publisher offers this deadline" if offered else "…"}"'
 
     def loops(self, nodes: Mapping[str, Listed]) -> list[str]:
         """For each loop the connection to delay: a person says what was there before the first step."""

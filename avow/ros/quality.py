@@ -103,7 +103,7 @@ class Recorded:
 
 def recorded(path: Path) -> tuple[Recorded, ...]:
     """The ends in a ROS 2 bag, or in the output of ``ros2 topic info --verbose``. Raises NoBag, OSError, ValueError."""
-    return tuple(_of_bag(path) if is_bag(path) else _of_info(path))
+    return tuple(_of_bag(path) if is_bag(path) else printed(read_text(path, "utf-8"), str(path)))
 
 
 def _of_bag(path: Path) -> Iterator[Recorded]:
@@ -131,10 +131,10 @@ def _seconds(nanoseconds: int) -> float:
 _LINE = re.compile(r"\s*(?:QoS profile:)?\s*([A-Z][A-Za-z ]*?)(?: \(Depth\))?:\s*(.*?)\s*\Z")
 
 
-def _of_info(path: Path) -> Iterator[Recorded]:
-    """The topic of each answer is in the command that asks, ``ros2 topic info --verbose /scan``: a line with it, or the
-    name alone, comes first."""
-    lines = read_text(path, "utf-8").splitlines()
+def printed(text: str, source: str = "") -> Iterator[Recorded]:
+    """The ends in the output of ``ros2 topic info --verbose``. The topic of each answer is in the command that asks,
+    ``ros2 topic info --verbose /scan``: a line with it, or the name alone, comes first. Raises ValueError."""
+    lines = text.splitlines()
     if not any(line.startswith("Endpoint type:") for line in lines):
         raise ValueError("it is neither a bag nor the output of `ros2 topic info --verbose`")
     said: dict[str, str] = {}
@@ -145,7 +145,7 @@ def _of_info(path: Path) -> Iterator[Recorded]:
             if "Endpoint type" in said:
                 node = f"{said.get('Node namespace', '/').rstrip('/')}/{said['Node name']}"
                 publishes = said["Endpoint type"] == "PUBLISHER"
-                yield Recorded(node, said["topic"], publishes, _told(said), Span(str(path), begin, 1, begin, 2))
+                yield Recorded(node, said["topic"], publishes, _told(said), Span(source, begin, 1, begin, 2))
             said, begin = {"topic": topic}, number
         if (found := _LINE.match(line)) is not None:
             said[found[1]] = found[2]

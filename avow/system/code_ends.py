@@ -2,20 +2,24 @@
 
 A topic that the code creates and the contract does not declare is a warning. What the contract declares and the code
 never creates, or creates with another type, is an error, and so are a publisher and a subscriber that DDS does not
-connect because of their quality of service. What the code computes is not known, and no error.
+connect because of their quality of service. What the code computes is not known, and no error. A warning says where
+the contract's times contradict a topic's deadline.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import fields, replace
+from fractions import Fraction
 from pathlib import Path
 
 from avow.base.diagnostics import Diagnostic, Severity, Span
 from avow.base.records import dataclass
 from avow.base.suggestions import nearest, suggest
 from avow.language.contract import Node, Topic
-from avow.language.terms import Role
+from avow.language.printer import show_number
+from avow.language.terms import And, History, Limit, Past, Role, Term
 from avow.ros.bags import NoBag
 from avow.ros.calls import OWN_CALLS
 from avow.ros.code import Code, Created, read_code
@@ -24,6 +28,8 @@ from avow.ros.drafting import is_plumbing
 from avow.ros.names import Placed
 from avow.ros.parameters import OF_EVERY_NODE, flat
 from avow.ros.quality import Quality, Recorded, recorded, unmet
+from avow.system.formulas import environment_assumptions
+from avow.system.graph import dataflow
 from avow.system.launched import where
 from avow.system.node_plan import parameter_place, parameters
 from avow.system.plan import Driving, NodeEnds, Plan, Source, System
@@ -76,6 +82,7 @@ def checked(system: System) -> Iterator[Diagnostic]:
         ends += own
     yield from _recorded(system, ends)
     yield from _connected(ends)
+    yield from _timed(system, ends)
 
 
 def _code(plan: Plan, source: Source | None, said: NodeEnds) -> Code:
@@ -245,3 +252,44 @@ def _connected(ends: Sequence[_End]) -> Iterator[Diagnostic]:
 
 
 _OFFER = "offer at least what is requested, or request no more than is offered"
+
+
+def _timed(system: System, ends: Sequence[_End]) -> Iterator[Diagnostic]:
+    """Steps that may be further apart than the deadline of a topic that they publish, and messages that are assumed
+    sooner than a deadline demands them: that of a publisher, or what the node itself requests."""
+    said = {entry.port: entry.assume_span for entry in system.plan.environment}
+    assumed = environment_assumptions(system, dataflow(system))
+    for node in system.contract.nodes:
+        placed = system.plan.ros.names.placed(node.name)
+        topics = {t.port.variable: placed.resolved(t.name) for t in node.topics if t.port is not None}
+        written = [(clause.formula, clause.span) for clause in node.assumptions]
+        written += [(each.formula, said[each.port]) for each in assumed if each.node == node.name]
+        sooner = [(*found, span) for formula, span in written for found in _arrives(formula)]
+        own = dict.fromkeys(topic for port, topic in topics.items() if port.role is Role.OUTPUT)
+        paces = [(c.pace, c.span) for c in node.guarantees if c.pace is not None]
+        times = [(topic, pace, span, True) for pace, span in paces for topic in own]
+        times += [(topics[port], limit, span, False) for port, limit, span in sooner if port in topics]
+        for topic, limit, span, speaks in times:
+            every = [e for e in ends if e.topic == topic and e.quality.deadline is not None]
+            offers = [e for e in every if e.publishes and (not speaks or e.node in (node.name, ""))]
+            asks = [e for e in every if not e.publishes and (speaks or e.node == node.name)]
+            end = min(offers or asks, key=lambda e: e.quality.deadline or 0, default=None)
+            deadline = Fraction(str(end.quality.deadline)) if end and end.quality.deadline != math.inf else None
+            if end is None or deadline is None or span is None:
+                continue
+            if limit.number > deadline if speaks else limit.number < deadline:
+                length = f"{show_number(limit.number)[0]} s"
+                does = f"may leave {topic} without a message for" if speaks else f"assumes a message on {topic} within"
+                text = f"{node.name} {does} {length}, and its deadline is {show_number(deadline)[0]} s"
+                notes = ((f"it is {'offered' if end.publishes else 'requested'} here", end.span),)
+                yield Diagnostic("ROS137", text, span, Severity.WARNING, "correct one of the times", notes)
+
+
+def _arrives(formula: Term) -> Iterator[tuple[Term, Limit]]:
+    """The inputs of which a formula demands messages (``once[100 ms](arrived(in.scan))``), and how soon."""
+    match formula:
+        case And(items=items):
+            for item in items:
+                yield from _arrives(item)
+        case History(Past.ONCE, (History(Past.ARRIVED, (port,)),), limit=limit) if limit and not limit.steps:
+            yield port, limit

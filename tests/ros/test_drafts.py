@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 import shutil
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ from avow.base.diagnostics import Rejected
 from avow.cli.check import command as check
 from avow.cli.init import command as init
 from avow.ros.drafting import by_names
+from avow.ros.listing import Listed, Listing
 from avow.system.graph import dataflow
 from avow.system.load import load_system
 
@@ -41,7 +43,7 @@ GRAPH = """\
 """
 
 
-def make_bag(path: Path, form: str, *, bare: bool = False) -> Path:
+def make_bag(path: Path, form: str, *, bare: bool = False, qos: Sequence[Any] = ()) -> Path:
     """Two topics: a rate with a NaN, and a status of a type of its own. `bare`: without definitions, as Humble's."""
     from rosbags.rosbag1 import Writer as Writer1
     from rosbags.rosbag2 import StoragePlugin
@@ -71,7 +73,7 @@ def make_bag(path: Path, form: str, *, bare: bool = False) -> Path:
         known = {}
         for k, (topic, kind, _, message) in enumerate(said, start=1):
             if topic not in known:
-                known[topic] = writer2.add_connection(topic, kind, typestore=store)
+                known[topic] = writer2.add_connection(topic, kind, typestore=store, offered_qos_profiles=qos)
             writer2.write(known[topic], k * 10**9, store.serialize_cdr(message, kind))
     if bare:
         import sqlite3
@@ -371,6 +373,69 @@ def test_own_messages_of_a_graph_are_given_by_their_folder(tmp_path: Path) -> No
     assert "control/Spin_Goal /spin matches(in.spin_goal)" in (system / "system.rcl").read_text(encoding="utf-8")
     text = (system / "msg/control/action/Spin.action").read_text(encoding="utf-8")
     assert text == "float64 angle\n---\nbool done\n---\nfloat64 left\n"
+
+
+QOS = """\
+/scan
+Node name: camera
+Node namespace: /
+Endpoint type: PUBLISHER
+  Deadline: 100000000 nanoseconds
+
+/scan
+Node name: watch
+Node namespace: /
+Endpoint type: SUBSCRIPTION
+  Deadline: 2500000000 nanoseconds
+
+/joy
+Node name: joystick
+Node namespace: /
+Endpoint type: PUBLISHER
+  Deadline: 500000 nanoseconds
+
+/stop
+Node name: watch
+Node namespace: /
+Endpoint type: PUBLISHER
+  Deadline: 9223372036854775807 nanoseconds
+"""
+
+
+def test_deadlines_of_a_running_graph_are_drafted_as_times(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    nodes = (Listed("/camera", ("/scan",)), Listed("/watch", ("/stop",), ("/scan", "/joy")))
+    listing = Listing(nodes, dict.fromkeys(("/scan", "/joy", "/stop"), "std_msgs/Float64"), QOS)
+    monkeypatch.setattr("avow.cli.from_ros.ask_domain", lambda *_: listing)
+    system = run(tmp_path / "w", "--from-graph", "ros2", "--distro", "humble")
+    file = system / "system.rcl"
+    text = file.read_text(encoding="utf-8")
+    assert text.count("// steps(") == 1
+    assert "// steps( at most 100 ms )" in text
+    assert text.count("// assume") == 1
+    assert "// assume alive_scan ( once[2500 ms](arrived(in.scan)) )" in text
+    plan = (system / "plan.yaml").read_text(encoding="utf-8")
+    assert (
+        '#   in.joy: {assume: "once[0.5 ms](arrived(in.joy))", because: "its publisher offers this deadline"}' in plan
+    )
+    steps, assume = (
+        re.findall(rf"// ({word}.*?\))  ", text)[0] for word in ("steps", "assume")
+    )  # as a person takes them
+    said = text.replace(f"// {steps}", f"{steps} //").replace(f"// {assume}", f"{assume} //")
+    file.write_text(said.replace("100 ms", "101 ms").replace("2500", "99"), encoding="utf-8")
+    told = CliRunner().invoke(check, [str(system)]).output
+    assert told.count("warning[ROS137]") == 2
+    assert "camera may leave /scan without a message for 0.101 s, and its deadline is 0.1 s" in told
+    assert "watch assumes a message on /scan within 0.099 s, and its deadline is 0.1 s" in told
+
+
+@pytest.mark.parametrize("seconds", [0, 1])
+def test_deadlines_in_a_bag_are_drafted_as_times(seconds: int, tmp_path: Path) -> None:
+    from rosbags.interfaces import Qos, QosDurability, QosHistory, QosLiveliness, QosReliability, QosTime
+
+    levels = QosHistory.KEEP_LAST, 5, QosReliability.RELIABLE, QosDurability.VOLATILE, QosTime(seconds, 0)
+    qos = Qos(*levels, QosTime(0, 0), QosLiveliness.AUTOMATIC, QosTime(0, 0), False)
+    system = run(tmp_path / "w", "--from-bag", str(make_bag(tmp_path / "run", "mcap", qos=[qos])))
+    assert (system / "system.rcl").read_text(encoding="utf-8").count("// steps( at most 1000 ms )") == 2 * seconds
 
 
 def test_services_of_a_bag_are_drafted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -111,3 +111,42 @@ def test_check_shows_both_places_and_ends_with_2(tmp_path: Path) -> None:
     assert done.returncode == 2
     text = "/scan: camera offers best_effort at camera.cpp:4, and watch requests reliable: DDS does not connect them"
     assert f"error[ROS131]: {text}\n  --> watch.py:10:9\n" in done.stdout
+
+
+SENT, HEARD = "float64 scan matches(out.x) )", "stop matches(in.on) )"
+WITHIN = "{} assume a ( y > 0 and once[50 ms](arrived(in.y)) )"
+OFFERS = ("camera.cpp", "SensorDataQoS()", "SensorDataQoS().deadline(100ms)")
+ASKS = (
+    "watch.py",
+    "qos_profile_sensor_data)",
+    "QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT, deadline=Duration(seconds=0.1)))",
+)
+ASSUMES = '\nenvironment: {{in.y: {{assume: "once[{} ms](arrived(in.y))", because: x}}}}\n'
+UNSAID = ("plan.yaml", CODE, "camera: {}")
+TIMES: list[tuple[list[tuple[str, str, str]], list[str]]] = [
+    ([("system.rcl", SENT, f"{SENT} steps( at most 200 ms )")], []),
+    ([("system.rcl", SENT, f"{SENT} steps( at most 200 ms )"), OFFERS], ["ROS137w system.rcl:5 camera.cpp:4"]),
+    ([("system.rcl", SENT, f"{SENT} steps( every 101 ms )"), OFFERS], ["ROS137w system.rcl:5 camera.cpp:4"]),
+    ([("system.rcl", SENT, f"{SENT} steps( at most 100 ms )"), OFFERS], []),
+    ([("system.rcl", SENT, f"{SENT} steps( at most 200 ms )"), ASKS, UNSAID], ["ROS137w system.rcl:5 watch.py:11"]),
+    ([("system.rcl", HEARD, WITHIN.format(HEARD)), OFFERS], ["ROS137w system.rcl:12 camera.cpp:4"]),
+    ([("system.rcl", HEARD, WITHIN.format(HEARD)), ASKS, UNSAID], ["ROS137w system.rcl:12 watch.py:11"]),
+    ([("system.rcl", HEARD, WITHIN.format(HEARD)), OFFERS, ("camera.cpp", "100ms", "50ms"), ASKS], []),
+    ([("system.rcl", HEARD, WITHIN.format(HEARD).replace("once", "not once")), OFFERS], []),
+    ([("plan.yaml", "nodes:\n  watch", f"{ASSUMES.format(50)}nodes:\n  watch")], ["ROS137w plan.yaml:5 qos.txt:2"]),
+    ([("plan.yaml", "nodes:\n  watch", f"{ASSUMES.format(100)}nodes:\n  watch")], []),
+]
+
+
+@pytest.mark.parametrize(("changes", "wanted"), TIMES)
+def test_times_of_the_contract_are_compared_with_deadlines(
+    tmp_path: Path, changes: list[tuple[str, str, str]], wanted: list[str]
+) -> None:
+    (tmp_path / "qos.txt").write_text(f"{RECORD}  Deadline: 100000000 nanoseconds\n", encoding="utf-8")
+    more = [
+        ("watch.py", "from std_msgs", "from rclpy.qos import QoSProfile, ReliabilityPolicy, Duration\nfrom std_msgs")
+    ] * (ASKS in changes)
+    if changes[0][0] == "plan.yaml":  # nobody of the contract publishes the topic, but the record knows its publisher
+        camera = node("camera", "", "x : REAL", "float64 scan matches(out.x)")
+        more = [("system.rcl", camera, ""), ("plan.yaml", f"nodes:\n    {CODE}", "qos: qos.txt")]
+    assert places(told(tmp_path, *more, *changes)) == wanted
