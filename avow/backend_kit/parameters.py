@@ -61,11 +61,12 @@ def missing(tool: Backend, job: Job) -> str:
 def _as_inputs(node: Node) -> Node:
     """The node whose parameters with values are inputs, and an assumption for each says the value."""
     ports = tuple(replace(port, value=None) for port in node.fixed)
-    said = tuple(_equals(port) for port in node.fixed)
+    said = tuple(equals(port) for port in node.fixed)
     return replace(node, inputs=(*node.inputs, *ports), assumptions=(*node.assumptions, *said), fixed=())
 
 
-def _equals(port: Port) -> Clause:
+def equals(port: Port) -> Clause:
+    """The assumption that a parameter has its value of the plan."""
     assert port.value is not None
     formula = equation(port.variable, port.value)
     name, sentence = f"{port.name}_value", f"The parameter {port.name} has its value of the plan"

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from avow.backend_kit.further import unknown_outside
 from avow.backend_kit.given import DURATION, READING, schema
-from avow.backend_kit.protocol import Backend, Job, JudgedRun, Limits, OutsideCheck, Report, Translated
+from avow.backend_kit.protocol import Backend, Job, JudgedRun, Limits, Opens, OutsideCheck, Report, Translated
 from avow.base.codec import document
 from avow.base.codes import Catalogue
 from avow.base.diagnostics import Diagnostic, Severity
@@ -44,7 +44,7 @@ class RosMonitoringBackend(Backend):
 
     name = "rosmonitoring"
     title = "runtime monitors, and recorded traces judged by them"
-    version = "18"
+    version = "19"
     strength = Verdict.MONITORED
     link = Link.MAPPED
     of = Object.RECORDING
@@ -112,6 +112,9 @@ class RosMonitoringBackend(Backend):
                 message = f"{clause.name} cannot be monitored: {hidden}"
                 problems.append(Diagnostic("MON103", message, span, Severity.WARNING))
         return tuple(problems)
+
+    def opens(self, job: Job) -> Opens:
+        return Opens.ANY
 
     def compares(self, job: Job) -> bool:
         from .further import leads

@@ -131,7 +131,7 @@ class Blame:
 
     def _followed(self, violation: Violation, origin: _Origin, *, late: bool) -> Violation | None:
         """A broken assumption, with its cause; None while a verdict on that is still open, unless it is late."""
-        node = self.system.contract.node(violation.node)
+        node = self.monitors[violation.node].setup.node
         edges = {port: self._edges(violation, port) for port in _inputs(node, violation.clause)}
         here = _place(violation)
         if not any(edges.values()):

@@ -29,7 +29,7 @@ from .options import same_topic
 from .pace import SEQUENCE, sequence
 from .paired import Paired
 from .pairing import ticks_at, time_of
-from .rules import Previous, heard_through
+from .rules import Parameter, Previous, heard_through
 from .traces import Services, chunks, parsed, unread
 from .tuning import REMEMBERED, TOPICS_KEPT
 from .watched import Violation, Watched
@@ -117,7 +117,7 @@ class Watch:
         setup, answers = monitor.setup, None if monitor.pairing is None else monitor.pairing.answers
         if not names or not monitor.by_values or not (setup.shared.keys() | setup.rates.keys()).isdisjoint(names):
             return None
-        if any(setup.carried[name].frame for name in names):
+        if any(setup.carried[name].frame or isinstance(setup.carried[name], Parameter) for name in names):
             return None
         found = monitor.about(names)
         if any(watched.held or not watched.outputs <= set(names) for watched in found):

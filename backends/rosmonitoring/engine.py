@@ -29,7 +29,7 @@ from .options import Setup, same_topic
 from .pace import SIMULATED, By, Clock, Passage, Timing
 from .pairing import NUMBER, Asked, Choices, Pairing, Replies, Ticks, backwards, ticks, time_of
 from .reading import Reader, reader
-from .rules import Choice, Constant, Fields, Previous, framed, heard_through, of_latest
+from .rules import EVENTS, Choice, Constant, Fields, Previous, framed, heard_through, of_latest
 from .tuning import OPEN_QUESTIONS, TOPICS_KEPT
 from .watched import Answer, Fault, Heard, Part, Tally, Violation, Watched, shown, time_text
 from .wires import MappingError, Unplaced
@@ -172,7 +172,7 @@ class Monitor:
             self.doubts = Doubts.beginning(self.values)
         if LOST in event or GONE in event:
             return self._gap(event, same_topic(str(topic)))
-        if readers and (self.setup.shared or PUBLISHER in event):
+        if readers and (self.setup.shared or PUBLISHER in event or same_topic(str(topic)) == EVENTS):
             readers = answers.own(self, readers, event)
         names = [name for name, _ in readers or ()]
         if readers is not None and self.so_far is not None and self._timed:

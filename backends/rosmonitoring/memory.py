@@ -29,7 +29,7 @@ from avow.language.terms import History, Implies, Past, Quantified, Role, Term, 
 
 from .options import Setup
 from .pace import Leeway, Silence, moments
-from .rules import Previous
+from .rules import Parameter, Previous
 from .watched import Tally, Watched, conditions_of
 from .word import undetermined
 
@@ -396,6 +396,10 @@ def watching(
     if hidden := [setup.hidden[n] for n in names if n in setup.hidden]:
         tally.reason, tally.hidden = hidden[0], True
         return None
+    # that a parameter keeps its value counts only where it does not
+    tally.hidden = all(
+        isinstance(rule := setup.rules[n], Parameter) and rule.variable != rule.of.variable for n in names
+    )
     tally.conditions, tally.met = len(watched.triggers), 0
     every = watched.steps is not None and watched.steps.every
     triggers = triggers_of(setup, names, every=every)

@@ -20,7 +20,7 @@ from avow.system.topics import whole_name
 
 from .options import Setup, origin, same_topic
 from .reading import shown
-from .rules import Choice, Constant, Fields, Previous, Rule
+from .rules import Choice, Constant, Fields, Parameter, Previous, Rule
 from .traces import carried
 
 
@@ -111,6 +111,8 @@ def readings(setup: Setup, span: Span | None) -> Iterator[Diagnostic]:
 def reading(name: str, rule: Rule) -> str:
     """``in.range ← range : float32 (/scan)``; empty for a variable that no message carries."""
     match rule:
+        case Parameter(paths=((node, parameter, *kept),)):
+            return "" if kept else f"{name} ← parameter {parameter} of {node} ({rule.topic})"
         case Fields():
             parts = []
             for at, path in enumerate(rule.paths):

@@ -296,6 +296,7 @@ def named_table(plan: Plan, name: str, *place: str | int) -> Table:
 _CHOICE_KEYS = frozenset(("topic", "type", "constructor", "arguments", "values", "initial"))
 _FIELD_KEYS = (
     "topic", "type", "field", "fields", "each", "hold", "values", "elsewhere", "initial", "take", "nan", "inf",
+    "parameter",
 )  # fmt: skip
 _FUNCTION_KEYS = ("each", "hold")
 _NAMED = (s.EnumSort, s.DataSort, s.StringSort)

@@ -27,8 +27,20 @@ from avow.system.plan import Edge, Located, System
 from . import observing
 from .pace import NO_TIME, RATE, By, Leeway, Rate, duration
 from .pairing import NUMBER, Answers
+from .parameters import kept, parameter, told
 from .reading import Undecided, from_text, shown
-from .rules import Choice, Constant, FieldPath, Fields, Previous, Rule, of_latest, otherwise, read_from_inputs
+from .rules import (
+    Choice,
+    Constant,
+    FieldPath,
+    Fields,
+    Parameter,
+    Previous,
+    Rule,
+    of_latest,
+    otherwise,
+    read_from_inputs,
+)
 from .traces import carried
 from .tuning import DECIDED_SHARE
 from .wires import MappingError, parts_of, table_of
@@ -73,7 +85,9 @@ class Setup:
         """Whether an event's message is the node's own, for a variable that it carries; None if that is not known. A
         message without a name is taken for the node's own if the contract has no other publisher; so is any that a
         filter guards."""
-        by = publisher(event)
+        by, rule = publisher(event), self.rules[name]
+        if isinstance(rule, Parameter):
+            return told(event, rule) is not None
         if name in self.shared:
             return by == self.placed if by in self.shared[name] else None
         guarded = same_topic(self.carried[name].topic) in self.filtered
@@ -116,8 +130,9 @@ class Setup:
 
     @property
     def heard(self) -> frozenset[str]:
-        """The inputs that messages carry."""
-        return frozenset(name for name in self.carried if name.startswith(f"{Role.INPUT}."))
+        """The inputs that messages carry, and that may change during a run."""
+        changing = (n for n, rule in self.carried.items() if not (isinstance(rule, Parameter) and rule.constant))
+        return frozenset(name for name in changing if name.startswith(f"{Role.INPUT}."))
 
     @property
     def topics(self) -> tuple[str, ...]:
@@ -138,11 +153,12 @@ def setup(
     for port in (*node.inputs, *node.outputs):
         work.port(port)
     work.shared_fields()
-    for name, told in read_from_inputs(work.rules, work.mapping()):
-        work.fault(f"it is read from the message that gives {told}", name, hint="name what the node publishes")
+    for name, inputs in read_from_inputs(work.rules, work.mapping()):
+        work.fault(f"it is read from the message that gives {inputs}", name, hint="name what the node publishes")
     data = observing.data_of(options)
     named, leeway = tuple((_called(system, node, t), t.ros_type) for t in node.topics), work.leeway(data)
     answers = work.answers(data.get("answers"), leeway.jitter)
+    node = kept(system, node, work.rules, known)
     made = Setup(
         node, work.rules, work.hidden, str(data.get("when", "outputs")), known, answers,
         float(data.get("decided", DECIDED_SHARE)), named, work.fresh(data.get("fresh")), work.rates(data.get("rate")),
@@ -333,14 +349,13 @@ class _Work:
 
     def as_published(self, name: str, rule: Rule) -> None:
         """A link states that both ends have one value: they must be read in the same way."""
-        for source in (
-            observing.sources(self.system, self.node, name.partition(".")[2]) if name in self.mapping() else ()
-        ):
-            node = self.system.contract.node(source.node)
-            other = _Work(self.system, node, observing.method_of(self.system, node.name), self.known)
+        mapped = name in self.mapping()
+        for source in observing.sources(self.system, self.node, name.partition(".")[2]) if mapped else ():
+            method = observing.method_of(self.system, source.node)
+            other = _Work(self.system, self.system.contract.node(source.node), method, self.known)
             if source.node == self.node.name or (entry := other.mapping().get(f"out.{source.port}")) is None:
                 continue
-            other.port(node.output(source.port))
+            other.port(other.node.output(source.port))
             rule_there = other.rules.get(f"out.{source.port}")
             if rule_there is not None and otherwise(rule, rule_there):
                 of = f"{observing.show_entry(entry)} of {getattr(rule_there, 'topic', 'no topic')}"
@@ -375,9 +390,8 @@ class _Work:
             return self.previous(port, entry)
         if entry is None and topic is None:
             if edge is not None and edge.delayed and edge.source.node == self.node.name:
-                return Previous(
-                    port.variable, f"out.{edge.source.port}", observing.first_value(self.system, port, edge)
-                )
+                first = observing.first_value(self.system, port, edge)
+                return Previous(port.variable, f"out.{edge.source.port}", first)
             if edge is None and self.interpretation(port) is not None:
                 return self.scenario(port)
         if edge is not None and edge.source.node != self.node.name:
@@ -388,6 +402,9 @@ class _Work:
                 entry = observing.published(self.system, self.node, port.name)
         if isinstance(entry, Mapping):
             topic = resolved(self.system, self.node, entry["topic"]) if "topic" in entry else topic
+        if "parameter" in (said := observing.written_out(entry)) or (port.parameter and topic is None):
+            initial = observing.literal(said["initial"], port.sort, "initial") if "initial" in said else None
+            return parameter(port, self.system, self.node, self.known, said.get("parameter", port.name), initial)
         if topic is None:
             return f"no topic of {self.node.name} matches {name}, and the plan does not map it"
         carriers = sorted({of.name for of in self.node.topics if of.port == port})

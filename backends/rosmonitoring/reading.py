@@ -15,7 +15,8 @@ from avow.ros import frames
 from avow.ros.bags import ENVELOPE, Event, message_of
 from avow.ros.definitions import INTEGERS, Array, Definitions, Message, Nested, Scalar, Wire
 
-from .rules import Argument, Choice, FieldPath, Fields, Hold, Lookup
+from . import parameters
+from .rules import Argument, Choice, FieldPath, Fields, Hold, Lookup, Parameter
 from .tuning import CANDIDATES_SHOWN
 from .wires import (
     Convert,
@@ -61,6 +62,8 @@ def _reader(rule: Fields | Choice) -> Reader:
     match rule:
         case Choice():
             return _choice(rule)
+        case Parameter():
+            return parameters.reader(rule)
         case Fields():
             sort = rule.variable.sort
             if isinstance(sort, s.FunctionSort):

@@ -13,6 +13,7 @@ from enum import StrEnum
 
 from avow.base.records import dataclass
 from avow.formulas.values import Value
+from avow.language.contract import Port
 from avow.language.terms import Role, Variable
 from avow.ros.definitions import Definitions, Wire
 
@@ -90,6 +91,22 @@ class Fields:
     def wire(self, at: int) -> Wire | None:
         """The type of the field at a path."""
         return self.wires[at] if at < len(self.wires) else None
+
+
+EVENTS = "parameter_events"
+"""The topic on which nodes of ROS 2 tell of their parameters."""
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter(Fields):
+    """A parameter of the node, or whether it has kept its value so far. The path is the node's name and its own."""
+
+    of: Port = field(kw_only=True)
+
+    @property
+    def constant(self) -> bool:
+        """Whether the contract says that it has one value in a run: when it is told does not matter then."""
+        return self.of.parameter
 
 
 @dataclass(frozen=True, slots=True)

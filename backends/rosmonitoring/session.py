@@ -237,10 +237,12 @@ class Session:
         return not self.counts
 
     def clauses(self) -> Iterator[tuple[Monitor, str, ClauseKind, Tally]]:
+        """Without those on parameters of which nothing was told."""
         for monitor in self.monitors:
             for clause in monitor.setup.node.clauses:
-                if clause.name in monitor.tallies:
-                    yield monitor, clause.name, clause.kind, monitor.tallies[clause.name]
+                tally = monitor.tallies.get(clause.name)
+                if tally is not None and (tally.published or tally.reason or not tally.hidden):
+                    yield monitor, clause.name, clause.kind, tally
 
     def summary(self) -> dict[str, Any]:
         """As JSON; its schema is in `docs/backends/rosmonitoring.md`."""

@@ -228,12 +228,44 @@ class GoEvent(IdlStruct, typename="my_msgs::srv::dds_::Go_Event_"):
     response: sequence[PlainResponse]
 
 
+@dataclass
+class ParameterValue(IdlStruct, typename="rcl_interfaces::msg::dds_::ParameterValue_"):
+    type: uint8
+    bool_value: bool
+    integer_value: int64
+    double_value: float64
+    string_value: str
+    byte_array_value: sequence[uint8]
+    bool_array_value: sequence[bool]
+    integer_array_value: sequence[int64]
+    double_array_value: sequence[float64]
+    string_array_value: sequence[str]
+
+
+@dataclass
+class Parameter(IdlStruct, typename="rcl_interfaces::msg::dds_::Parameter_"):
+    name: str
+    value: ParameterValue
+
+
+@dataclass
+class ParameterEvent(IdlStruct, typename="rcl_interfaces::msg::dds_::ParameterEvent_"):
+    stamp: Time
+    node: str
+    new_parameters: sequence[Parameter]
+    changed_parameters: sequence[Parameter]
+    deleted_parameters: sequence[Parameter]
+
+
 CALLED = (GoRequest, GoResponse, SendGoal, GetResult, GotResult)
 
 NODES = {24: (Gid24, Node24, Participant24), 16: (Gid16, Node16, Participant16)}
 """What ROS 2 says of its nodes: rmw_dds_common, up to Humble and since."""
 
-KINDS = {kind.__name__: kind for kind in (Double, Wrong, Short, Single, Scan, FeedbackMessage, GoEvent, *CALLED)}
+KINDS = {
+    kind.__name__: kind
+    for kind in (Double, Wrong, Short, Single, Scan, FeedbackMessage, GoEvent, ParameterEvent, *CALLED)
+}
 QOS = {
     "reliable": Policy.Reliability.Reliable(duration(seconds=1)),
     "best_effort": Policy.Reliability.BestEffort,
@@ -259,6 +291,10 @@ def value(kind, given):
         event, number, request, response = given
         info = EventInfo(event, Time(1, 0), [3] * 16, number)
         return GoEvent(info, [PlainRequest(v) for v in request], [PlainResponse(v, "x") for v in response])
+    if kind is ParameterEvent:
+        node, *told = given  # of new, changed and deleted parameters: their names and numbers
+        every = [[Parameter(n, ParameterValue(3, False, 0, v, "", [], [], [], [], [])) for n, v in one] for one in told]
+        return ParameterEvent(Time(1, 0), node, *every)
     return kind(given)
 
 

@@ -26,7 +26,7 @@ from avow.ros.calls import is_part
 
 from ..memory import triggers_of
 from ..options import Setup, same_topic
-from ..rules import Choice, Constant, FieldPath, Fields, Previous, Rule
+from ..rules import Choice, Constant, FieldPath, Fields, Parameter, Previous, Rule
 from ..tuning import CASES
 from ..wires import parts_of
 from . import symbols as sym
@@ -185,6 +185,8 @@ class _Machine:
         names = sorted(free_names(self.clause.formula))
         for name in names:
             topic = getattr(self.setup.rules.get(name), "topic", "")
+            if isinstance(self.setup.rules.get(name), Parameter):
+                raise rml.NotRml(f"{name} is a parameter, and an event of {topic} tells of several")
             if is_part(topic):
                 raise rml.NotRml(f"{name} is a part of a call ({topic}), and Avow writes RML about topics")
         self._choose(names)
