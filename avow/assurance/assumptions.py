@@ -14,7 +14,7 @@ from datetime import date
 from avow.assurance.answers import MODELS, PLATFORM, REACTION, RECORDINGS, SAMPLES, START, TOOLS, Assumption, Sort
 from avow.assurance.closure import Closed, used
 from avow.assurance.facts import Facts
-from avow.assurance.findings import takes
+from avow.assurance.findings import accepts
 from avow.assurance.gap import reviewers
 from avow.assurance.model import ObligationView
 from avow.assurance.naming import short
@@ -239,7 +239,7 @@ def _accepted(facts: Facts, views: Sequence[ObligationView], closed: Mapping[str
     }
     for claim in dict.fromkeys(name for found in closed.values() for name in found.accepted):
         hypothesis = supposed[claim]
-        given = next((f for f in facts.accepted if takes(f.obligation, f.matched, hypothesis.name)), None)
+        given = next((f for f in facts.accepted if accepts(f.obligation, f.found, hypothesis)), None)
         holders = {name for name, found in closed.items() if claim in found.accepted}
         said = Statement(hypothesis.name)
         if given is not None:

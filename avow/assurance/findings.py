@@ -17,7 +17,7 @@ from datetime import date
 from avow.assurance.model import Handled
 from avow.base import codec
 from avow.base.files import sha256
-from avow.base.verdict import Verdict
+from avow.base.verdict import Hypothesis, Verdict
 from avow.evidence.ledger import Entry
 from avow.evidence.obligation import Obligation
 from avow.evidence.status import Status, roll_up
@@ -65,6 +65,9 @@ def _match(
     if alike and finding.verdict in FINDINGS and not is_wild(finding.obligation):
         asked = (e for e in counting[alike[0].id] if finding.method in (None, e.evidence.method))
         now = mark(asked)
+    if finding.verdict == Status.MISSING:
+        rested = (h for entries in counting.values() for e in entries for h in e.evidence.rests_on)
+        now = next((h.digest[:12] for h in rested if h.name == finding.obligation), "")
     now = now if now != finding.found else ""
     if now and finding.found:
         alike = []
@@ -111,6 +114,12 @@ def takes(pattern: str, matched: Sequence[str], name: str) -> bool:
     """Whether a finding covers the obligation of that id (without the system): one with wildcards covers only what it
     matched when it was written, as the plan records it."""
     return _matches(pattern, name) and (not is_wild(pattern) or name in matched)
+
+
+def accepts(name: str, found: str, hypothesis: Hypothesis) -> bool:
+    """Whether an entry of that name, marked with `found`, accepts what a method supposes: an edit of the text that says
+    it (a box, initial values) ends the acceptance."""
+    return name == hypothesis.name and found == hypothesis.digest[:12]
 
 
 def _matches(pattern: str, name: str) -> bool:

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from avow.assurance.answers import Level
 from avow.assurance.hazards import HazardView
 from avow.assurance.model import Gate, ObligationView, RequirementView, Suggestion
-from avow.assurance.naming import requirement_claim, short
+from avow.assurance.naming import requirement_claim
 from avow.assurance.policy import CRITICALITIES, Policy
 from avow.assurance.rates import exceeds
 from avow.assurance.standards import StandardView, State
@@ -26,7 +26,8 @@ def remedies(names: Iterable[str], views: Mapping[str, ObligationView]) -> Itera
     """The next steps for claims that fail; an assumption that a person has to accept is named in the plan."""
     for name in names:
         if name.startswith("assumption:"):
-            entry = f"{{obligation: {short(name)}, verdict: missing, reason: …, who: …, date: …, expires: …}}"
+            about, _, mark = name.removeprefix("assumption:").rpartition(":")
+            entry = f"{{obligation: {about}, verdict: missing, found: {mark}, reason: …, who: …, date: …, expires: …}}"
             yield Suggestion(f"accept the assumption: `accepted: [{entry}]`", cost=5)
         elif name in views and (suggestion := views[name].suggestion):
             yield suggestion

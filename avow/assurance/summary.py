@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
 from avow.assurance.facts import Facts
-from avow.assurance.findings import takes
+from avow.assurance.findings import accepts
 from avow.assurance.model import Currency, DerivationView, Handled, ObligationView, OpenItem, RequirementView
 from avow.assurance.naming import derivation_claim, requirement_claim, short
 from avow.assurance.state import ended
@@ -75,8 +75,14 @@ def open_items(
             )
             items.append(OpenItem("another finding", f.pattern, text))
         elif f.now and f.how == "accepted":
-            text = f"accepted, whatever refutes it: for this finding, and no worse one, write  found: {f.now}"
-            items.append(OpenItem("unmarked", f.pattern, text, advice=True))
+            supposed = f.verdict == Status.MISSING
+            why = (
+                "whatever refutes it: for this finding, and no worse one,"
+                if not supposed
+                else "without its text's mark:"
+            )
+            text = f"accepted {why} write  found: {f.now}"
+            items.append(OpenItem("unmarked", f.pattern, text, advice=not supposed))
         if f.expired:
             text = f"{f.how} by {f.who or 'nobody'} until {f.expires}: {f.reason}"
             items.append(OpenItem("expired", f.pattern, text))
@@ -103,9 +109,9 @@ def open_items(
 def _used(accepted: Handled, views: Sequence[ObligationView]) -> bool:
     """Whether evidence rests on an assumption that is accepted, or may once a method of its node has run."""
     own = [view for view in views if accepted.pattern.startswith(f"{view.obligation.node}/assumption/")]
-    supposed = [h.name for view in own for record in view.records for h in record.rests_on]
+    supposed = [h for view in own for record in view.records for h in record.rests_on]
     missing = any(record.verdict is Verdict.NOT_RUN for view in own for record in view.records)
-    return missing or any(takes(accepted.pattern, accepted.matched, name) for name in supposed)
+    return missing or any(accepts(accepted.pattern, accepted.found, h) for h in supposed)
 
 
 def _failed_attempts(views: Sequence[ObligationView]) -> Iterable[OpenItem]:

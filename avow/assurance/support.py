@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence, Set
 
 from avow.assurance.facts import Facts
-from avow.assurance.findings import takes
+from avow.assurance.findings import accepts
 from avow.assurance.model import Derivation, Handled, NodeView
 from avow.assurance.naming import derivation_claim, is_advice, is_foundation, requirement_claim, sanity_property
 from avow.base.remembered import by_identity
@@ -108,11 +108,11 @@ def assumption_claim(hypothesis: Hypothesis) -> str:
 
 def assumption_claims(hypotheses: Iterable[Hypothesis], accepted: Iterable[Handled]) -> Iterable[Claim]:
     """The assumptions that a person has to accept: justified if a person has (``accepted: {obligation:
-    agent/assumption/…, verdict: missing, …}``) and still does, else missing."""
+    agent/assumption/…, verdict: missing, found: …}``) and still does, else missing."""
     taken = [f for f in accepted if f.how == "accepted" and f.verdict == Status.MISSING and not f.expired]
     found = {h: None for h in hypotheses if h.kind is HypothesisKind.ASSUMPTION}
     for hypothesis in found:
-        given = any(takes(f.pattern, f.matched, hypothesis.name) for f in taken)
+        given = any(accepts(f.pattern, f.found, hypothesis) for f in taken)
         status = Status.JUSTIFIED if given else Status.MISSING
         yield Claim(assumption_claim(hypothesis), status, link=Link.GUIDED if given else None)
 

@@ -60,17 +60,30 @@ def test_an_assumption_wants_a_person() -> None:
     assert found.obligation(at).standing is Status.UNSUPPORTED
     wanted = "accept the assumption: `accepted: [{obligation: agent/assumption/termination, verdict: missing,"
     assert {g.id for g in found.gates if any(s.text.startswith(wanted) for s in g.suggestions)} == {"requirements"}
-    taken = Finding("agent/assumption/*", Verdict.REFUTED, "seen", "A. Person", facts.today.isoformat(), "2030-01-01")
+    taken = Finding(
+        ends.name, Verdict.REFUTED, "seen", "A. Person", facts.today.isoformat(), "2030-01-01", found="1" * 12
+    )
     assert conclude(replace(facts, accepted=(taken,))).obligation(at).standing is Status.UNSUPPORTED
-    taken = replace(taken, verdict="missing")
-    assert conclude(replace(facts, accepted=(taken,))).obligation(at).standing is Status.UNSUPPORTED
-    taken = replace(taken, matched=(ends.name,), says="The loop ends")
+    taken = replace(taken, verdict="missing", says="The loop ends")
     found = conclude(replace(facts, accepted=(taken,)))
     assert found.obligation(at).standing is Status.JUSTIFIED
     assert "The loop ends" in [a.words for a in conclude(facts_of_case(found)).assumptions]
-    assert "unused" not in [item.kind for item in found.open_items]
-    unused = conclude(replace(facts, accepted=(replace(taken, obligation="mem/assumption/other", matched=()),)))
+    assert not {"unused", "unmarked", "another finding"} & {item.kind for item in found.open_items}
+    unused = conclude(replace(facts, accepted=(replace(taken, obligation="mem/assumption/other"),)))
     assert "unused" in [item.kind for item in unused.open_items]
+
+
+@pytest.mark.parametrize(("mark", "item"), [("2" * 12, "another finding"), ("", "unmarked")])
+def test_an_accepted_assumption_is_bound_to_its_text(mark: str, item: str) -> None:
+    """An edit of the box, or of the initial values, ends the acceptance; the report says what to write."""
+    facts = facts_of_case(rover_case())
+    at = proved(facts)
+    facts = resting(facts, at, Hypothesis(HypothesisKind.ASSUMPTION, "agent/assumption/box", "1" * 64, "0 <= x <= 2"))
+    today = facts.today.isoformat()
+    taken = Finding("agent/assumption/box", "missing", "seen", "A. Person", today, "2030-01-01", found=mark)
+    found = conclude(replace(facts, accepted=(taken,)))
+    assert found.obligation(at).standing is Status.UNSUPPORTED
+    assert [i.text.endswith("write  found: 111111111111") for i in found.open_items if i.kind == item] == [True]
 
 
 def test_what_rests_on_a_limit_is_checked_at_most() -> None:
