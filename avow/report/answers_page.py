@@ -10,13 +10,13 @@ from urllib.parse import quote
 
 from markupsafe import Markup
 
-from avow.assurance.answers import MEANINGS, Assumption, Level, NodeBasis, SupposedLine, Tone
+from avow.assurance.answers import MEANINGS, Assumption, Level, NodeBasis, Tone
 from avow.assurance.first_screen import basis_of
 from avow.assurance.model import Case, NodeView, ObligationView
 from avow.assurance.relied import kept_apart, shade
 from avow.assurance.state import baseline_of
 from avow.base.plain import count, listed
-from avow.base.tuning.shown import NODE_BOXES, SHEET_LETTERS
+from avow.base.tuning.shown import NODE_BOXES
 from avow.evidence.obligation import Kind
 from avow.evidence.record import Evidence
 from avow.evidence.status import Status, weigh
@@ -62,11 +62,9 @@ def render_answers(case: Case, json_digest: str = "") -> str:
         kinds=KINDS,
         listed=case.listed,
         many=_many(case),
-        others=lambda line: others(case, line),
         refuted=_refuted,
         some=listed,
         tone_of_level={level: _tone_of(case, level) for level in Level},
-        worded=worded(case),
     )
 
 
@@ -113,16 +111,6 @@ def full_reason(assumption: Assumption) -> str:
     for part in sorted({*parts}, key=len, reverse=True):  # a search in one text: there is a part for each claim
         longer += f"\0{part}\0" if part and part not in longer else ""
     return "; ".join(dict.fromkeys(part for part in parts if part and f"\0{part}\0" in longer))
-
-
-def others(case: Case, line: SupposedLine) -> list[Assumption]:
-    """The assumptions of a line's sort that it names by number only."""
-    return [s for s in case.assumptions if s.number in line.others]
-
-
-def worded(case: Case) -> bool:
-    """Whether a printed first sheet has room for all assumptions in words: paper has no folds to open."""
-    return sum(len(s.words) for s in case.assumptions) + sum(len(r.text) for r in case.listed) <= SHEET_LETTERS
 
 
 def _many(case: Case) -> bool:

@@ -9,7 +9,7 @@ from importlib import resources
 from itertools import chain
 from typing import Any
 
-from avow.assurance.answers import Assumption, SupposedLine
+from avow.assurance.answers import Assumption
 from avow.assurance.model import Case, ObligationView, RequirementView, SourceView
 from avow.assurance.naming import short
 from avow.assurance.state import baseline_of
@@ -21,7 +21,7 @@ from avow.base.verdict import Counterexample
 from avow.evidence.obligation import SYSTEM_LEVEL, Kind
 from avow.evidence.status import Status
 from avow.report import example
-from avow.report.answers_page import full_reason, others, worded
+from avow.report.answers_page import full_reason
 from avow.report.modules import RequirementModule, requirement_modules
 from avow.report.page import by_node
 from avow.report.source import plain_lines
@@ -127,17 +127,9 @@ def _first(case: Case) -> dict[str, Any]:
         "listed": rows,
         "weakest": a.refuted or _weakest(case),
         "deficits": [f"{w.count} {w.words}" for w in case.deficits] or ["No deficit is known."],
-        "supposed": [(line.about, *_supposed(case, line)) for line in a.supposed],
+        "supposed": [(line.about, f"{line.number} {line.says}", line.more) for line in a.supposed],
         "content": f"What is signed has the digest {baseline_of(case).content[:16]}…",
     }
-
-
-def _supposed(case: Case, line: SupposedLine) -> tuple[str, str]:
-    """The line's assumptions in words, and the numbers of those that the page has no room for."""
-    first = f"{line.number} {line.says}"
-    if not worded(case):
-        return first, line.more
-    return "; ".join((first, *(f"{s.number} {s.words}" for s in others(case, line)))), ""
 
 
 def _weakest(case: Case) -> str:

@@ -8,7 +8,7 @@ from typing import Any
 
 from avow.assurance.model import Case
 from avow.base.plain import identifiers
-from avow.report.answers_page import render_argument, worded
+from avow.report.answers_page import render_argument
 from avow.report.markdown import render_markdown
 from avow.report.pdf import _data as pdf_data
 from avow.report.short import LINES, WIDTH, WORDS, comment, terminal_lines
@@ -98,8 +98,6 @@ def words(found: Case) -> list[str]:
         told.append(f"looked at {sorted(used)}, explained {sorted(explained)}")
     paper = pdf_data(found)["first"]
     listed = " ".join(" ".join(line) for line in paper["supposed"])
-    if worded(found):
-        told += [f"on paper without words: {s.number}" for s in found.assumptions if clean(s.words) not in listed]
-    elif any(line.more and clean(line.more) not in listed for line in a.supposed):
+    if any(line.more and clean(line.more) not in listed for line in a.supposed):
         told.append("on paper without a number")
     return told

@@ -365,6 +365,22 @@ def test_report_check_recounts(tmp_path: Path) -> None:
     )
 
 
+@pytest.mark.skipif(not REPORTS, reason="no system has been verified here: `doit verify`")
+def test_the_words_that_the_docs_explain_stand_on_the_page() -> None:
+    """Each phrase in italics under "The first screen", with any numbers."""
+    docs = (Path(__file__).parents[2] / "docs/reading-a-report.md").read_text("utf-8")
+    told = docs.partition("## The first screen")[2].partition("## Behind")[0]
+    phrases = {" ".join(found.split()) for found in re.findall(r"(?<!\*)\*([^*]+)\*(?!\*)", told)}
+    pages = " ".join((folder / name).read_text("utf-8") for folder in REPORTS for name in FIRST)
+    shown = " ".join(re.sub(r"<[^>]*>", " ", pages).split()).casefold()
+    phrases -= set(map(str, Object))  # a report has those that it needs, explained (`first_screen.words`)
+    plain = {phrase: re.sub(r"\d(?:\\?\.\d|\d)*", r"[\\d.]+", re.escape(phrase.casefold())) for phrase in phrases}
+    assert {phrase for phrase, pattern in plain.items() if not re.search(pattern, shown)} == set()
+
+
+FIRST = ("index.html", "argument.html")
+
+
 def test_it_is_a_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main([str(tmp_path)]) == 2
     assert "cannot be read" in capsys.readouterr().err

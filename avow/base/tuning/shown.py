@@ -81,9 +81,6 @@ FINDING_CHARACTERS = 240
 PDF_OBLIGATIONS = 500
 """Obligations in the PDF: nobody turns more pages; all are in report.json, and the PDF says so."""
 
-SHEET_LETTERS = 1400
-"""Letters of assumptions and listed requirements for which the first printed sheet has room."""
-
 PDF_COLUMNS = 9
 """Columns of a run that fit on a page. For a wider run only the reason is shown."""
 
