@@ -119,7 +119,7 @@ def _parse(data: bytes, file: str) -> ET.Element:
     except expat.ExpatError as error:
         wrong = xml_fault(data, error)
         where = Span(file, wrong.line, wrong.column, wrong.line, wrong.column)
-        raise Rejected(Diagnostic("REQS003", wrong.message, where, hint=wrong.hint)) from None
+        raise Rejected(Diagnostic("REQS003", str(wrong), where, hint=wrong.hint)) from None
     except (ValueError, LookupError) as error:  # an encoding that Python does not know
         raise Rejected(Diagnostic("REQS003", f"this is not XML: {error}", Span(file, 1, 1, 1, 1))) from None
 

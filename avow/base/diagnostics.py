@@ -64,3 +64,11 @@ def refuse(found: Iterable[Diagnostic]) -> None:
     errors = [diagnostic for diagnostic in found if diagnostic.is_error]
     if errors:
         raise Rejected(*errors)
+
+
+class Malformed(Exception):  # noqa: N818 - it is what was found wrong
+    """A text that is not what it should be: its first fault. `line` and `column` count from 1."""
+
+    def __init__(self, message: str, line: int = 1, column: int = 1, hint: str | None = None) -> None:
+        super().__init__(message)
+        self.line, self.column, self.hint = line, column, hint

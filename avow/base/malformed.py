@@ -9,45 +9,34 @@ from xml.parsers import expat
 
 import yaml
 
+from avow.base.diagnostics import Malformed
 from avow.base.packaged import packaged
-from avow.base.records import dataclass
-
-
-@dataclass(frozen=True, slots=True)
-class Fault:
-    """The first fault of a text; line and column count from 1."""
-
-    message: str
-    line: int = 1
-    column: int = 1
-    hint: str | None = None
-
 
 # -- YAML --------------------------------------------------------------------------------------------------------------
 
 
-def yaml_fault(text: str, error: yaml.YAMLError) -> Fault:
+def yaml_fault(text: str, error: yaml.YAMLError) -> Malformed:
     """`error`: what PyYAML raised for the text."""
     if isinstance(error, yaml.reader.ReaderError):
         before = text[: error.position]
         shown = f"character U+{ord(text[error.position]):04X}" if error.position < len(text) else "a character"
-        return Fault(f"{shown} does not belong in YAML", before.count("\n") + 1, len(before) - before.rfind("\n"))
+        return Malformed(f"{shown} does not belong in YAML", before.count("\n") + 1, len(before) - before.rfind("\n"))
     if not isinstance(error, yaml.MarkedYAMLError):
-        return Fault("not YAML")
+        return Malformed("not YAML")
     mark, begun = error.problem_mark or error.context_mark, error.context_mark
     noticed = mark.line if mark else 0
     if begun and begun.line < noticed and re.search("flow|simple key|quoted", error.context or ""):
         mark = begun  # what is not ended is the fault, not the line at which that is noticed
     line, column = (mark.line + 1, mark.column + 1) if mark else (1, 1)
     if quote := _open_quote(text, noticed):
-        return Fault(
+        return Malformed(
             f"the text that begins with this {text[quote.index]} is closed only on a later line, or never",
             quote.line + 1,
             quote.column + 1,
             f"close it with {text[quote.index]} where it ends",
         )
     problem, hint = _in_words("yaml", error.problem or "not YAML")
-    return _line_before(text.splitlines(), line - 1) or Fault(problem, line, column, hint)
+    return _line_before(text.splitlines(), line - 1) or Malformed(problem, line, column, hint)
 
 
 def _open_quote(text: str, noticed: int) -> yaml.Mark | None:
@@ -64,7 +53,7 @@ def _open_quote(text: str, noticed: int) -> yaml.Mark | None:
     return None
 
 
-def _line_before(lines: Sequence[str], at: int) -> Fault | None:
+def _line_before(lines: Sequence[str], at: int) -> Malformed | None:
     """The fault of the line before line `at`, if that one begins no item of a list although this one does, in the same
     column, or lacks the blank between a key and its value."""
     before = next((k for k in range(at - 1, -1, -1) if lines[k].strip() and lines[k].lstrip()[0] != "#"), None)
@@ -72,11 +61,11 @@ def _line_before(lines: Sequence[str], at: int) -> Fault | None:
         return None
     column = len(lines[before]) - len(lines[before].lstrip())
     if found := re.match(r"\s*(?:- )?(\w+):[\w.]+$", lines[before]):
-        return Fault(f"a blank is missing after `{found[1]}:`", before + 1, column + 1, "write `key: value`")
+        return Malformed(f"a blank is missing after `{found[1]}:`", before + 1, column + 1, "write `key: value`")
     undashed = lines[at].lstrip().startswith("- ") and column == len(lines[at]) - len(lines[at].lstrip())
     if not undashed or lines[before].lstrip().startswith("-"):
         return None
-    return Fault("this line begins no item of the list below", before + 1, column + 1, "write `- ` before it")
+    return Malformed("this line begins no item of the list below", before + 1, column + 1, "write `- ` before it")
 
 
 def _in_words(kind: str, problem: str) -> tuple[str, str | None]:
@@ -90,7 +79,7 @@ def _in_words(kind: str, problem: str) -> tuple[str, str | None]:
 # -- XML ---------------------------------------------------------------------------------------------------------------
 
 
-def xml_fault(text: str | bytes, error: expat.ExpatError) -> Fault:
+def xml_fault(text: str | bytes, error: expat.ExpatError) -> Malformed:
     """`error`: what expat raised for the text."""
     opened: list[tuple[str, int]] = []
     parser = expat.ParserCreate()
@@ -104,4 +93,4 @@ def xml_fault(text: str | bytes, error: expat.ExpatError) -> Fault:
         tag, line = opened[-1]
         message = f"<{tag}> of line {line} is not closed before this"
         hint = f"write `</{tag}>` here, or end its first tag on line {line} with `/>`"
-    return Fault(f"this is not XML: {message}", error.lineno, error.offset + 1, hint)
+    return Malformed(f"this is not XML: {message}", error.lineno, error.offset + 1, hint)

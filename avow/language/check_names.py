@@ -161,7 +161,9 @@ class Names(ABC):
         if self.scope.is_broken(name) or tree.start in self.reports.odd:  # the latter is reported by the lexer
             return
         known = self.scope.known() if what == "name" else (*self.scope.known(), *map(str, Past), "always")
-        hint = WORDS.get(name.casefold()) or did_you_mean(name, known)
+        owners = [n.name for n in self.scope.nodes.values() if any(p.name == name for p in (*n.inputs, *n.outputs))]
+        hint = f"write {' or '.join(f'`{owner}.{name}`' for owner in owners)}" if owners else None
+        hint = hint or WORDS.get(name.casefold()) or did_you_mean(name, known)
         if hint is None and text:
             hint = f'write texts in quotation marks: `"{name}"`'
         if hint is None and what == "name":

@@ -169,7 +169,7 @@ def _method(
             or tool.campaigns in method.options.data.keys() - options.data
         ):
             return  # without the faulty options the others mean nothing
-        dropped = tuple(f"`{key}`" for key in method.options.data if key not in options.data)
+        dropped = tuple(f"`{key}" for key in method.options.data if key not in options.data)
         method = replace(method, options=options)
     for known in (n for n in system.contract.nodes if n.name == node):
         named = {clause.name for clause in known.guarantees}  # others are reported where the plan names them

@@ -10,6 +10,7 @@ import re
 from collections.abc import Iterator, Mapping
 from dataclasses import field
 
+from avow.base.diagnostics import Malformed
 from avow.base.records import dataclass
 from avow.base.suggestions import did_you_mean, suggest
 
@@ -87,14 +88,6 @@ class Message:
         """The definition as a ``.msg`` text that `parse_message` reads, without limits on lengths."""
         constants = (f"{kind} {name}={value}\n" for name, kind, value in self.constants)
         return "".join((*constants, *(f"{inner.wire} {inner.name}\n" for inner in self.fields)))
-
-
-class WrongDefinition(Exception):  # noqa: N818 - it is what was found wrong
-    """A text that does not define a message; `line` counts from 1."""
-
-    def __init__(self, message: str, line: int, hint: str | None = None) -> None:
-        super().__init__(message)
-        self.line, self.hint = line, hint
 
 
 class NoField(Exception):  # noqa: N818 - it is what was found wrong
@@ -211,7 +204,7 @@ _FIELD = re.compile(
 
 
 def parse_message(text: str, name: str, source: str = "") -> Message:
-    """One ``.msg`` text; `name` is ``package/Type``. Raises WrongDefinition."""
+    """One ``.msg`` text; `name` is ``package/Type``. Raises Malformed."""
     package = name.split("/")[0]
     fields: dict[str, Field] = {}
     constants: list[tuple[str, str, str]] = []
@@ -221,29 +214,29 @@ def parse_message(text: str, name: str, source: str = "") -> Message:
             continue
         found = _FIELD.match(line)
         if found is None:
-            raise WrongDefinition(f"{line[:60]!r} is neither `type name` nor `type NAME=value`", number)
+            raise Malformed(f"{line[:60]!r} is neither `type name` nor `type NAME=value`", number)
         scalar, rest = _scalar(found["type"], package), found["rest"]
         if isinstance(scalar, Nested) and re.fullmatch(
             "[a-z][^/]*", found["type"]
         ):  # a message's begins with a capital
             hint = suggest(found["type"], sorted((*SCALARS, *OTHER_NAMES, "Header")))
-            raise WrongDefinition(f"there is no type {found['type']}", number, hint)
+            raise Malformed(f"there is no type {found['type']}", number, hint=hint)
         if rest.startswith("="):
             if not isinstance(scalar, Scalar) or found["array"]:
-                raise WrongDefinition(f"the constant {found['name']} has no built-in type", number)
+                raise Malformed(f"the constant {found['name']} has no built-in type", number)
             # a string's value is the rest of the line, including what looks like a comment (ROS 1)
             value = raw.split("=", 1)[1].strip() if scalar.name == "string" else rest[1:].strip()
             if not _is_value(value, found["type"]):
-                raise WrongDefinition(f"{value[:60]!r} is no value of {found['type']}", number)
+                raise Malformed(f"{value[:60]!r} is no value of {found['type']}", number)
             constants.append((found["name"], scalar.name, value.strip("\"'") if scalar.name == "string" else value))
             continue
         if rest.startswith("//"):
-            raise WrongDefinition("`//` begins no comment", number, "a comment begins with `#`")
+            raise Malformed("`//` begins no comment", number, hint="a comment begins with `#`")
         if rest and (rest[0] == ";" or not line[found.end("name")].isspace()):
             text = f"{rest[:60]!r} stands after the name of the field {found['name']}"
-            raise WrongDefinition(text, number, "a line ends with the name, or with a default value set apart from it")
+            raise Malformed(text, number, hint="a line ends with the name, or with a default value set apart from it")
         if found["name"] in fields:
-            raise WrongDefinition(f"the field {found['name']} is listed twice", number)
+            raise Malformed(f"the field {found['name']} is listed twice", number)
         size = found["size"] or ""
         wire = Array(scalar, int(size) if size.isdigit() else None) if found["array"] else scalar
         fields[found["name"]] = Field(found["name"], wire, number)
@@ -307,21 +300,22 @@ def definition_file(name: str) -> tuple[str, tuple[str, ...]]:
 
 def parse_parts(text: str, name: str, kind: str, source: str = "") -> tuple[Message, ...]:
     """A ``.srv`` (``package/Type_Request``, ``…_Response``) or ``.action`` text (``…_Goal``, ``…_Result``,
-    ``…_Feedback``), and the messages that ROS 2 makes of these. Raises WrongDefinition."""
+    ``…_Feedback``), and the messages that ROS 2 makes of these. Raises Malformed."""
     lines = text.splitlines()
     parts = [part.split("\n")[1:] for part in re.split(r"\n[ \t]*---[ \t]*(?=\n)", "\n".join(["", *lines, ""]))]
     wanted = _PARTS[kind]
     if len(parts) != len(wanted):
         rule = re.compile(r"\s*(?!---\s*$)[-=_*—–]+\s*")  # a line that was meant to be `---`
         at = next((at for at, line in enumerate(lines, 1) if rule.fullmatch(line)), len(lines) or 1)
-        raise WrongDefinition(f"a .{kind} has {len(wanted)} parts, set apart by `---`; this has {len(parts)}", at)
+        message = f"a .{kind} has {len(wanted)} parts, set apart by `---`; this has {len(parts)}"
+        raise Malformed(message, at, hint="write `---` on a line of its own between two parts")
     found: list[Message] = []
     before = 0
     for part, suffix in zip(parts, wanted, strict=True):
         try:
             found.append(parse_message("\n".join(part), f"{name}_{suffix}", source))
-        except WrongDefinition as wrong:
-            raise WrongDefinition(str(wrong), wrong.line + before, wrong.hint) from None
+        except Malformed as wrong:
+            raise Malformed(str(wrong), wrong.line + before, hint=wrong.hint) from None
         before += len(part) + 1
     made = ((f"{name}_{end}", text.format(name)) for end, text in _WRAPPED[kind].items())
     return (*found, *(parse_message(text, whole, source) for whole, text in made))

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from avow.base.diagnostics import Diagnostic, Rejected, Span
+from avow.base.diagnostics import Diagnostic, Malformed, Rejected, Span
 from avow.base.files import read_text
 from avow.base.tuning.sizes import DEFINITION_BYTES
 from avow.ros.definitions import (
@@ -21,7 +21,6 @@ from avow.ros.definitions import (
     Nested,
     Scalar,
     Wire,
-    WrongDefinition,
     canonical,
     parse_message,
     parse_parts,
@@ -128,7 +127,7 @@ def _of_file(path: Path, faults: list[Diagnostic]) -> tuple[Message, ...]:
         if kind == "idl":
             return _of_idl(text, str(path))
         return parse_parts(text, name, kind, str(path)) if kind != "msg" else (parse_message(text, name, str(path)),)
-    except WrongDefinition as wrong:
+    except Malformed as wrong:
         faults.append(Diagnostic("ROS101", f"{name}: {wrong}", _at(path, wrong.line), hint=wrong.hint))
     except (OSError, ValueError) as error:
         faults.append(Diagnostic("ROS101", f"{name} cannot be read: {error}", _at(path, 1)))
@@ -141,7 +140,7 @@ def _of_idl(text: str, source: str) -> tuple[Message, ...]:
     try:
         return tuple(from_store(get_types_from_idl(text), source).values())
     except TypesysError as error:
-        raise WrongDefinition(f"no IDL that can be read: {error}", 1) from None
+        raise Malformed(f"no IDL that can be read: {error}", 1) from None
 
 
 def _at(path: Path, line: int) -> Span:

@@ -8,15 +8,16 @@ import contextlib
 import functools
 import re
 from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
 
 from avow.base.diagnostics import Diagnostic, Severity, Span
 from avow.base.files import inside, read_regular
 from avow.base.plain import count
-from avow.base.python_names import unbound
-from avow.base.suggestions import suggest
+from avow.base.python_names import imported, inherited, top_level, unbound
+from avow.base.suggestions import did_you_mean, suggest
 from avow.ros.definitions import Message
 from avow.ros.sources import definitions
-from avow.system.plan import Plan
+from avow.system.plan import Driving, Plan, Source
 
 _GIVES: Mapping[str, tuple[int, str, tuple[str, ...], int]] = {
     "create_subscription": (2, "callback", ("message",), 1),  # and the message's info, in newer distributions
@@ -31,6 +32,10 @@ _GIVES: Mapping[str, tuple[int, str, tuple[str, ...], int]] = {
 be."""
 
 
+_FIRST = {".msg": "", ".srv": "_Request", ".action": "_Goal"}
+"""A module of generated classes → how the first of the messages that define each class ends."""
+
+
 def misused(plan: Plan) -> Iterator[Diagnostic]:
     """Callbacks that do not take what ROS calls them with, and a warning for each name that nothing defines, in the
     Python files that the plan names as sources. A file that is no Python is left to the methods."""
@@ -42,6 +47,7 @@ def misused(plan: Plan) -> Iterator[Diagnostic]:
         with contextlib.suppress(OSError, SyntaxError, ValueError, RecursionError):
             tree = ast.parse(read_regular(path))
             faults = [*_callbacks(tree, str(path)), *_imports(tree, str(path), messages)]
+            faults += source_faults(entry.source, path) if entry.source else ()
             yield from faults
             remedied = set(
                 re.findall(r"\w+", " ".join(re.findall("`([^`]*)`", " ".join(d.hint or "" for d in faults))))
@@ -56,17 +62,35 @@ def misused(plan: Plan) -> Iterator[Diagnostic]:
                 yield Diagnostic("DRIVE106", message, _span(name, str(path)), Severity.WARNING, hint)
 
 
+def source_faults(source: Source, path: Path) -> tuple[Diagnostic, ...]:
+    """What is wrong with the class that a plan declares, as far as its file's text shows: there is none of that name,
+    or it is of another kind. Raises OSError, SyntaxError, ValueError and RecursionError if the file cannot be read."""
+    tree = ast.parse(read_regular(path))
+    defined = top_level(tree)
+    declared = defined.get(source.class_name)
+    if not isinstance(declared, ast.ClassDef):
+        hint = suggest(source.class_name, [name for name, one in defined.items() if isinstance(one, ast.ClassDef)])
+        message = f"`{source.python}` defines no class `{source.class_name}`"
+        return (Diagnostic("DRIVE108", message, source.place.at("source", "class"), hint=hint),)
+    meant = [kind for kind in (Driving.RCLPY, Driving.ROSPY) if kind in imported(tree)]
+    if len(meant) == 1 and source.kind not in meant and inherited(declared, "step", defined) is None:
+        message = f"`{source.python}` imports {meant[0]}, and `kind` is {source.kind}"
+        return (Diagnostic("DRIVE108", message, source.place.at("source"), hint=f"write `kind: {meant[0]}`"),)
+    return ()
+
+
 def _imports(tree: ast.Module, file: str, messages: Callable[[], Mapping[str, Message]]) -> Iterator[Diagnostic]:
     """A warning for each message that is imported from a known package without it."""
     wanted = [(node, part) for node in ast.walk(tree) if isinstance(node, ast.ImportFrom) for part in node.names]
-    wanted = [(node, part) for node, part in wanted if (node.module or "").endswith(".msg") and not node.level]
+    wanted = [(node, part) for node, part in wanted if (node.module or "").endswith(tuple(_FIRST)) and not node.level]
     known = messages() if wanted else {}
     for node, part in wanted:
-        package = (node.module or "").removesuffix(".msg")
-        own = [name.removeprefix(f"{package}/") for name in known if name.startswith(f"{package}/")]
+        package, _, kind = (node.module or "").rpartition(".")
+        names = (re.fullmatch(rf"{package}/([^_]*){_FIRST[f'.{kind}']}", name, re.ASCII) for name in known)
+        own = [name[1] for name in names if name]
         if own and part.name not in (*own, "*"):
             at = Span(file, part.lineno, part.col_offset + 1, part.lineno, part.col_offset + 1 + len(part.name))
-            message = f"there is no message {package}/{part.name}"
+            message = f"there is no {kind.replace('msg', 'message')} {package}/{part.name}"
             yield Diagnostic("DRIVE107", message, at, Severity.WARNING, suggest(part.name, own))
 
 
@@ -86,6 +110,9 @@ def _callbacks(tree: ast.Module, file: str) -> Iterator[Diagnostic]:
                     act = methods.get(name)
                 case _:  # no callback, or none that its text decides
                     continue
+            if act is None and name not in stored and (near := did_you_mean(name, methods)):
+                message = f"`self.{name}` is not defined: the class has no such method"
+                yield Diagnostic("DRIVE106", message, _span(call, file), Severity.WARNING, near)
             if act is None or act.decorator_list or name in stored or _takes(act.args, 1 + len(names), more):
                 continue
             what = " and ".join(("the object", *(f"the {each}" for each in names)))

@@ -72,12 +72,14 @@ class Rest:
 
 
 def rest_of(folder: Path) -> Rest | None:
-    """None if no plan could be read, even in part."""
+    """None if no plan could be read, even in part, or if it has no contract."""
     from avow.language.load import check_paths, read_in_part
 
     try:
         plan, root, faults, dropped, wrong = read_rest(folder / "plan.yaml")
     except Rejected:
+        return None
+    if not plan.contract_files:
         return None
     contract, found = check_paths(plan.contract_files)
     faults += tuple(d for d in found if d.is_error)

@@ -173,7 +173,7 @@ def started_with(launched: Started) -> tuple[dict[str, tuple[Any, Span]], tuple[
             if isinstance(error, yaml.YAMLError):
                 text = setting.value if setting.name else read_text(Path(setting.value), errors="replace")
                 wrong = yaml_fault(text, error)
-                why, near = f"line {wrong.line}: {wrong.message}", wrong.hint
+                why, near = f"line {wrong.line}: {wrong}", wrong.hint
             elif isinstance(error, OSError):
                 why, near = error.strerror or why, nearby(Path(setting.value))
             message = f"{launched.name} is started with the parameters of {what}, which are not read: {why}"

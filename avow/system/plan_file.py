@@ -14,6 +14,7 @@ from typing import Any, TypeVar
 from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.base.files import inside, read_regular, sha256
 from avow.base.remembered import Shelf
+from avow.base.suggestions import nearby
 from avow.ros.names import Placed, Resolver
 from avow.ros.quality import BAG_FILE, quality, seconds
 from avow.system.hazards import read_hazards
@@ -196,7 +197,9 @@ class _PlanReader:
                     "PLAN108", f"{path.name} is a symbolic link that leads out of the system's folder", self.root.span
                 )
         if not found:
-            self.fault("PLAN107", f"no contract: there is no .rcl file in {self.path.parent}", self.root.span)
+            hint = nearby(self.path.parent / "system.rcl", "system.rcl") or "write one, or name it under `contract:`"
+            message = f"no contract: there is no .rcl file in {self.path.parent}"
+            self.fault("PLAN107", message, self.root.span, hint)
         return found
 
     def connections(self) -> Iterator[Edge]:

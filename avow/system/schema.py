@@ -91,6 +91,10 @@ def violations(
 
 def _departures(options: Located, schema: Mapping[str, Any], whole: str) -> tuple[Diagnostic, ...]:
     found = [d for error in _validator()(schema).iter_errors(options.data) for d in _explain(error, options, whole)]
+    # a value has one fault, whichever rules it breaks
+    found = list(
+        {(d.span, d.message.partition(": ")[0] if d.code == "PLAN105" else d.message): d for d in found}.values()
+    )
     # the faults of what YAML repeats (`*name`) have one place, and the validator uses sets
     return tuple(sorted(found, key=lambda d: (d.span.line, d.span.column, d.message) if d.span else (0, 0, d.message)))
 

@@ -42,7 +42,7 @@ def read_yaml(data: bytes, file: str) -> tuple[Piece, tuple[Diagnostic, ...]]:
         return builder.build(text), tuple(builder.problems)
     except yaml.YAMLError as error:
         found = yaml_fault(text, error)
-        raise Rejected(_error(found.message, file, found.line, found.column, found.hint)) from None
+        raise Rejected(_error(str(found), file, found.line, found.column, found.hint)) from None
 
 
 def scalar(text: str) -> Any:

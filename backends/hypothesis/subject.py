@@ -11,9 +11,10 @@ from typing import Any
 
 from avow.backend_kit.given import existing_file
 from avow.backend_kit.protocol import Job
-from avow.base.diagnostics import Diagnostic, Rejected, Span
+from avow.base.diagnostics import Diagnostic, Rejected, Span, refuse
 from avow.base.files import inside, read_regular
-from avow.base.suggestions import did_you_mean, suggest
+from avow.base.python_names import imported, inherited, method_of, top_level
+from avow.base.suggestions import did_you_mean
 from avow.drive.steps import coded
 from avow.formulas.formula import free_variables
 from avow.language.sorts import (
@@ -27,6 +28,7 @@ from avow.language.sorts import (
     Sort,
     TupleSort,
 )
+from avow.system.driven import source_faults
 from avow.system.node_plan import parameters
 from avow.system.plan import Driving, Numbers, Source
 
@@ -72,25 +74,17 @@ def subject(job: Job) -> SubjectFile:
         raise Rejected(Diagnostic("HYPO103", f"this is no Python: {error.msg}", span)) from error
     except (OSError, ValueError, RecursionError) as error:
         raise Rejected(Diagnostic("HYPO103", f"`{found.name}` cannot be read: {error}", place)) from error
-    defined = _top_level(tree)
+    defined = top_level(tree)
     if found.driven:
         assert job.source is not None
-        declared = defined.get(job.source.class_name)
-        if not isinstance(declared, ast.ClassDef):
-            where, wanted = job.source.place.at("source", "class"), job.source.class_name
-            hint = suggest(wanted, [name for name, one in defined.items() if isinstance(one, ast.ClassDef)])
-            raise Rejected(Diagnostic("HYPO102", f"`{found.name}` defines no class `{wanted}`", where, hint=hint))
-        meant = [kind for kind in (Driving.RCLPY, Driving.ROSPY) if kind in _imported(tree)]
-        if len(meant) == 1 and job.source.kind not in meant and _inherited(declared, "step", defined) is None:
-            message = f"`{found.name}` imports {meant[0]}, and `kind` is {job.source.kind}"
-            raise Rejected(
-                Diagnostic("HYPO107", message, job.source.place.at("source"), hint=f"write `kind: {meant[0]}`")
-            )
+        refuse(source_faults(job.source, found.path))
         if job.source.kind is not Driving.STEP:
             return found
-        begun = _method(declared, "__init__")
+        declared = defined[job.source.class_name]
+        assert isinstance(declared, ast.ClassDef)
+        begun = method_of(declared, "__init__")
         found = replace(found, wants_parameters=begun is not None and len(begun.args.args) > 1)
-        return _without(found, _method(declared, "step"), job)
+        return _without(found, method_of(declared, "step"), job)
     if found.function not in defined:
         message = f"`{found.name}` defines no function `{found.function}`"
         raise Rejected(Diagnostic("HYPO102", message, place, hint=did_you_mean(found.function, defined)))
@@ -100,7 +94,7 @@ def subject(job: Job) -> SubjectFile:
         if problems:
             raise Rejected(*problems)
         return replace(found, accepted=_accepted(definition.args))
-    if isinstance(definition, ast.ClassDef) and (step := _inherited(definition, "step", defined)) is not None:
+    if isinstance(definition, ast.ClassDef) and (step := inherited(definition, "step", defined)) is not None:
         return _step_class(found, definition, step, job)
     return found
 
@@ -108,7 +102,7 @@ def subject(job: Job) -> SubjectFile:
 def _step_class(found: SubjectFile, definition: ast.ClassDef, step: ast.FunctionDef, job: Job) -> SubjectFile:
     """A class with a method `step` that the option names: constructed without arguments, once for each run. Raises
     Rejected."""
-    begun = _method(definition, "__init__")
+    begun = method_of(definition, "__init__")
     problems = _arguments(step, found, job, method=True)
     if begun is not None and len(begun.args.args) - len(begun.args.defaults) > 1:
         message = f"`{definition.name}` is made without arguments"
@@ -155,24 +149,6 @@ def _without(found: SubjectFile, step: ast.FunctionDef | None, job: Job) -> Subj
 
 def _accepted(arguments: ast.arguments) -> frozenset[str] | None:
     return None if arguments.kwarg is not None else frozenset(a.arg for a in (*arguments.args, *arguments.kwonlyargs))
-
-
-def _inherited(definition: ast.ClassDef, name: str, defined: Mapping[str, ast.AST]) -> ast.FunctionDef | None:
-    """A class' method, its own or that of a base in the same file."""
-    seen: list[ast.ClassDef] = []
-    waiting = [definition]
-    while waiting:
-        one = waiting.pop(0)
-        seen.append(one)
-        if (method := _method(one, name)) is not None:
-            return method
-        bases = [defined.get(base.id) for base in one.bases if isinstance(base, ast.Name)]
-        waiting += [base for base in bases if isinstance(base, ast.ClassDef) and base not in seen]
-    return None
-
-
-def _method(definition: ast.ClassDef, name: str) -> ast.FunctionDef | None:
-    return next((s for s in definition.body if isinstance(s, ast.FunctionDef) and s.name == name), None)
 
 
 def locate(job: Job) -> SubjectFile:
@@ -242,36 +218,10 @@ def modules(path: Path) -> tuple[Path, ...]:
             tree = ast.parse(read_regular(file))
         except (OSError, ValueError, SyntaxError, RecursionError):
             continue
-        for head in sorted(_imported(tree)):
+        for head in sorted(imported(tree)):
             beside = (path.parent / f"{head}.py", path.parent / head / "__init__.py")
             stack.extend(candidate for candidate in beside if candidate.is_file())
     return tuple(sorted(found))
-
-
-def _imported(tree: ast.Module) -> set[str]:
-    """The first names of the modules that a file imports, at any place."""
-    names: set[str] = set()
-    for node in ast.walk(tree):
-        names |= {node.module or ""} if isinstance(node, ast.ImportFrom) else set()
-        names |= {alias.name for alias in node.names} if isinstance(node, ast.Import) else set()
-    return {name.partition(".")[0] for name in names} - {""}
-
-
-def _top_level(tree: ast.Module) -> dict[str, ast.stmt]:
-    found: dict[str, ast.stmt] = {}
-    for statement in tree.body:
-        match statement:
-            case ast.FunctionDef(name=name) | ast.AsyncFunctionDef(name=name) | ast.ClassDef(name=name):
-                found[name] = statement
-            case ast.Assign(targets=targets):
-                found.update((t.id, statement) for t in targets if isinstance(t, ast.Name))
-            case ast.AnnAssign(target=ast.Name(id=name)):
-                found[name] = statement
-            case ast.Import(names=names) | ast.ImportFrom(names=names):
-                found.update(((a.asname or a.name).partition(".")[0], statement) for a in names)
-            case _:  # imports nothing
-                pass
-    return found
 
 
 def _arguments(

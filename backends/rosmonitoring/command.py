@@ -320,9 +320,8 @@ def _print_summary(running: Session, further: int) -> None:
         click.echo(f"withheld: {', '.join(f'{topic} {count}' for topic, count in running.withheld.items())}")
     if unmonitored := running.unmonitored():
         click.echo(f"unmonitored: {', '.join(unmonitored)}")
-        for name, remedy in unmonitored.items():
-            if remedy:
-                click.echo(f"  {name}: {remedy}")
+        for remedy in dict.fromkeys(filter(None, unmonitored.values())):
+            click.echo(f"  {', '.join(name for name, its in unmonitored.items() if its == remedy)}: {remedy}")
     if running.unheard:
         told = listed([f"{topic} ({count})" for topic, count in running.unheard.items()], 10)
         click.echo(f"topics of the trace that no clause uses, and their events: {told}")

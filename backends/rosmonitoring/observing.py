@@ -21,7 +21,7 @@ from avow.ros.definitions import INTEGERS, SCALARS, Array, Definitions, Message,
 from avow.system.graph import dataflow
 from avow.system.plan import Edge, Endpoint, Located, Plan, System, Table
 
-from .reading import SOURCES, Undecided, decide, shown, words
+from .reading import SOURCES, Undecided, decide, fitting_fields, shown, words
 from .rules import NOTHING_KNOWN, Argument, Choice, FieldPath, Fields, Gap, Hold, Lookup, Rule, Take
 from .wires import MappingError, converter, fits, parts_of, whole
 
@@ -132,7 +132,8 @@ def _wires(
             message = at.known.messages[wire.item.name]
         found = [at.known.at(message, way) for way in paths]
     except NoField as error:
-        raise Wrong(str(error), "field" if "field" in entry else "fields", hint=error.hint) from None
+        near = error.hint or fitting_fields(at.port.sort, message, at.known)
+        raise Wrong(str(error), "field" if "field" in entry else "fields", hint=near) from None
     sort = at.port.sort
     sorts = sort.items if isinstance(sort, s.TupleSort) and len(paths) > 1 else parts_of(sort)
     for way, (wire, holder), part in zip(paths, found, sorts, strict=True):
@@ -140,7 +141,8 @@ def _wires(
             _check_take(way, wire, part, take, at.known)
             continue
         if not fits(part, wire, at.known) and not isinstance(part, s.DataSort):
-            raise Wrong(f"{shown(way) or 'the message'} is {wire}, which cannot be read as {_said(part)}", "field")
+            text = f"{shown(way) or 'the message'} is {wire}, which cannot be read as {_said(part)}"
+            raise Wrong(text, "field", hint=fitting_fields(part, message, at.known))
         if isinstance(part, s.EnumSort) and isinstance(wire, Scalar):
             names = words(part, wire, holder, entry.get("values", {}))
             _check_words(way, wire, part, holder, names, bool(entry.get("values")))
@@ -263,7 +265,8 @@ def _field(at: Observed, way: FieldPath, sort: s.Sort, *place: str | int) -> Wir
     else:
         usable = fits(sort, wire, at.known)
     if not usable:
-        raise Wrong(f"{shown(way)} is {wire}, which cannot be read as {_said(sort)}", *place)
+        text = f"{shown(way)} is {wire}, which cannot be read as {_said(sort)}"
+        raise Wrong(text, *place, hint=fitting_fields(sort, at.message, at.known))
     return wire
 
 

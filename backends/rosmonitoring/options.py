@@ -424,7 +424,7 @@ class _Work:
         except Undecided as undecided:
             if self.asked(port):
                 raise observing.Wrong(str(undecided), hint=undecided.hint or _FIELD_HINT) from None
-            return str(undecided)
+            return f"{undecided}; {undecided.hint or _FIELD_HINT}"
 
     def topic(self, node: Node, port: Port) -> tuple[str | None, str | None]:
         """The name and the type of the topic that carries a port."""

@@ -264,6 +264,14 @@ def decide(sort: Sort, message: Message, known: Definitions, values: Mapping[str
     raise Undecided(f"{which}: {listed(told, CANDIDATES_SHOWN)}", hint)
 
 
+def fitting_fields(sort: Sort, message: Message, known: Definitions) -> str | None:
+    """A hint for a field from which a value of the sort cannot be read: those from which it can."""
+    names = [
+        ".".join(map(str, at)) for at, wire, of in _places(message, known) if at and suits(sort, wire, of, known, {})
+    ]
+    return f"fields that can be read as it: {listed(names, CANDIDATES_SHOWN)}" if names else None
+
+
 def _hint(
     wanted: Sequence[Sort],
     places: Sequence[tuple[FieldPath, Wire, Message]],

@@ -196,7 +196,7 @@ def test_exact_numbers_are_none_of_messages(tmp_path: Path) -> None:
     assert [d.code for d in TOOL.check(given)] == ["HYPO106"]
     given = job(tmp_path / "v", "rospy", ROS1.replace("class Watch:", "class Other:"))
     (found,) = TOOL.check(given)
-    assert (found.code, found.hint) == ("HYPO102", "known: Other")
+    assert (found.code, found.hint) == ("DRIVE108", "known: Other")
     given = job(tmp_path / "u", "rospy", ROS1, "{mapping: {in.q: data}}")
     assert [d.code for d in TOOL.check(given)] == ["MON101"]
 
@@ -205,7 +205,7 @@ def test_a_class_of_one_ros_is_not_driven_as_another(tmp_path: Path) -> None:
     for kind, text in (("rclpy", ROS1), ("rospy", ROS2), ("step", ROS2)):
         given = job(tmp_path / kind, kind, text)
         (found,) = (d for d in TOOL.check(given) if d.is_error)
-        assert (found.code, found.hint) == ("HYPO107", f"write `kind: {'rospy' if text is ROS1 else 'rclpy'}`")
+        assert (found.code, found.hint) == ("DRIVE108", f"write `kind: {'rospy' if text is ROS1 else 'rclpy'}`")
 
 
 @pytest.mark.slow

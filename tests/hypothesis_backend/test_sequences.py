@@ -123,7 +123,7 @@ def test_what_another_process_answers_otherwise_is_no_function(tmp_path: Path) -
 def test_no_class_of_that_name(tmp_path: Path) -> None:
     work = job(tmp_path, REAL, "guarantee g ( out.u == in.r )", "r):\n        return r\n")
     (tmp_path / "node.py").write_text("class Other: pass\n")
-    assert [d.code for d in BACKEND.check(work)] == ["HYPO102"]
+    assert [d.code for d in BACKEND.check(work)] == ["DRIVE108"]
     assert {tmp_path / "node.py", tmp_path / "p.yaml"} <= set(BACKEND.files(work))
 
 

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from avow.ros.definitions import Array, Definitions, Nested, Scalar, WrongDefinition, parse_message, parse_parts
+from avow.base.diagnostics import Malformed
+from avow.ros.definitions import Array, Definitions, Nested, Scalar, parse_message, parse_parts
 from avow.ros.sources import DISTRIBUTIONS, definitions, distribution
 
 
@@ -75,7 +76,7 @@ def test_the_forms_of_a_message() -> None:
     ],
 )
 def test_what_is_no_definition_is_located(text: str, line: int) -> None:
-    with pytest.raises(WrongDefinition) as caught:
+    with pytest.raises(Malformed) as caught:
         parse_message(text, "p/M")
     assert caught.value.line == line
 
@@ -94,12 +95,12 @@ def test_services_and_actions_are_their_parts() -> None:
         "p/Go_GetResult_Response",
         "p/Go_FeedbackMessage",
     ]
-    with pytest.raises(WrongDefinition, match="2 parts"):
+    with pytest.raises(Malformed, match="2 parts"):
         parse_parts("int32 a", "p/Do", "srv")
-    with pytest.raises(WrongDefinition, match="2 parts") as caught:
+    with pytest.raises(Malformed, match="2 parts") as caught:
         parse_parts("int32 a\n--\nbool b\n", "p/Do", "srv")
     assert caught.value.line == 2, "the line that was meant to set them apart"
-    with pytest.raises(WrongDefinition) as caught:
+    with pytest.raises(Malformed) as caught:
         parse_parts("int32 a\n---\n? b", "p/Do", "srv")
     assert caught.value.line == 3
 

@@ -106,6 +106,8 @@ def test_headers_are_never_meant(make_system: Callable[..., System]) -> None:
     [
         ("NATURAL", "x", "float64 x", "x is float64, which cannot be read as NATURAL"),
         ("REAL", "x", "string x", "x is string, which cannot be read as REAL"),
+        ("REAL", "b", "float64 x\nbool b\nint8 c", "read as REAL (fields that can be read as it: x, c)"),
+        ("REAL", "gone", "float64 x\nbool b", "(fields that can be read as it: x)"),
         ("REAL", "y", "float64 x", "has no field 'y'; it has x"),
         ("REAL", "distence", "float64 distance", "has no field 'distence'; it has distance (did you mean `distance`?)"),
         ("REAL", "yaw", "float64 x", "(a/Turn has such a field)"),

@@ -203,6 +203,29 @@ def test_inputs_that_are_too_old_are_no_success(tmp_path: Path) -> None:
         assert (done.returncode, "too old (`max_age`)" in done.stdout) == (code, code == 1), done.stdout
 
 
+def test_one_remedy_for_several_clauses_is_said_once(tmp_path: Path) -> None:
+    (tmp_path / "system.rcl").write_text(
+        "node n { inputs( x : REAL ) outputs( y : BOOL ) topics( std_msgs/Float64 x matches(in.x), std_msgs/Bool y "
+        "matches(out.y) ) guarantee g ( in.x > 5 -> out.y ) guarantee h ( in.x < 0 -> not out.y ) }"
+    )
+    (tmp_path / "plan.yaml").write_text("ros: {distro: humble}\nnodes: {n: {methods: [{rosmonitoring: {}}]}}\n")
+    events = [{"topic": "x", "time": 1.0, "data": 9.0}, {"topic": "y", "time": 1.1, "data": True}]
+    done = monitor(str(tmp_path), "-", stdin="".join(f"{json.dumps(event)}\n" for event in events))
+    assert "unmonitored: n.g, n.h\n  n.g, n.h: the plan does not say which input" in done.stdout
+    assert done.stdout.count("add `answers:") == 1
+
+
+def test_a_field_that_is_not_clear_says_what_to_write(tmp_path: Path) -> None:
+    (tmp_path / "system.rcl").write_text(
+        "node n { inputs() outputs( y : REAL ) topics( geometry_msgs/Point y matches(out.y) ) guarantee( out.y > 0 ) }"
+    )
+    (tmp_path / "plan.yaml").write_text("ros: {distro: humble}\n")
+    done = monitor(str(tmp_path), "-", stdin='{"topic": "y", "time": 0, "x": 1, "y": 2, "z": 3}\n')
+    assert "more than one field of geometry_msgs/Point: x : float64, y : float64, z : float64; name the field" in (
+        done.stdout
+    )
+
+
 def test_without_answers_what_held_is_no_evidence_and_no_success(tmp_path: Path) -> None:
     (tmp_path / "system.rcl").write_text(
         "node n { inputs( x : REAL ) outputs( y : BOOL ) topics( std_msgs/Float64 x matches(in.x), std_msgs/Bool y "

@@ -221,6 +221,40 @@ def test_without_faults_there_is_a_system(tmp_path: Path) -> None:
     assert check(tmp_path) == []
 
 
+@pytest.mark.parametrize(
+    ("name", "hint"), [("system.rlc", "did you mean `system.rlc`?"), ("", "write one, or name it")]
+)
+def test_a_plan_without_a_contract_is_one_fault(name: str, hint: str, tmp_path: Path) -> None:
+    """And not one for each name of the plan that it would declare."""
+    folder = place(tmp_path, [])
+    (folder / "system.rcl").rename(folder / (name or "a.txt"))
+    assert check(folder) == [("plan.yaml", "PLAN107")]
+    with pytest.raises(Rejected) as found:
+        load_system(folder)
+    assert [(d.code, hint in (d.hint or "")) for d in found.value.diagnostics] == [("PLAN107", True)]
+
+
+def test_a_port_without_its_node_in_a_requirement_names_the_nodes_that_have_it(tmp_path: Path) -> None:
+    folder = place(tmp_path, [])
+    text = (folder / "plan.yaml").read_text()
+    (folder / "plan.yaml").write_text(text.replace("thermometer.temperature <", "temperature <"))
+    with pytest.raises(Rejected) as found:
+        load_system(folder)
+    (fault,) = found.value.diagnostics
+    assert (fault.code, fault.hint) == ("RCL201", "write `thermometer.temperature` or `thermostat.temperature`")
+
+
+def test_a_faulty_option_is_one_fault_and_no_warning_that_it_is_missing(tmp_path: Path) -> None:
+    folder = place(tmp_path, [])
+    text = (folder / "plan.yaml").read_text()
+    (folder / "plan.yaml").write_text(
+        text.replace("traces: [run.jsonl],", "traces: [run.jsonl], answers: {by: stamps},")
+    )
+    printed = CliRunner().invoke(command("check"), [str(folder)]).output
+    assert "did you mean `stamp`?" in printed
+    assert "cannot be monitored" not in printed
+
+
 def test_a_plan_that_is_no_yaml_keeps_no_fault_of_the_contract_back(tmp_path: Path) -> None:
     folder = place(tmp_path, ["unknown port"])
     (folder / "plan.yaml").write_text(PLAN.replace("compose:", "compose:\n\t"))

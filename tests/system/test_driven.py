@@ -84,6 +84,38 @@ def test_what_may_be_right_is_not_told(registered: str, method: str, tmp_path: P
     assert told(tmp_path, registered, method) == []
 
 
+def test_a_callback_whose_name_the_class_has_otherwise(tmp_path: Path) -> None:
+    assert told(tmp_path, HEAR, "def herd(self, message): pass") == [("DRIVE106", "did you mean `herd`?")]
+
+
+@pytest.mark.parametrize(
+    ("source", "column", "said"),
+    [
+        ("class: AA, kind: rclpy", 43, "did you mean `A`?"),
+        ("class: A, kind: rospy", 21, "write `kind: rclpy`"),
+        ("class: A", 21, "write `kind: rclpy`"),
+        ("class: A, kind: rclpy", 0, ""),
+        ("class: B", 0, ""),
+    ],
+)
+def test_the_class_of_a_source_is_looked_up_whatever_the_methods_are(
+    tmp_path: Path, source: str, column: int, said: str
+) -> None:
+    """`avow check` finds what `avow drive` would refuse."""
+    (tmp_path / "system.rcl").write_text(CONTRACT, "utf-8")
+    text = "import rclpy\nfrom rclpy.node import Node\nclass A(Node):\n    pass\nclass B:\n    def step(self): pass\n"
+    (tmp_path / "a.py").write_text(text, "utf-8")
+    (tmp_path / "plan.yaml").write_text(f"nodes: {{a: {{source: {{python: a.py, {source}}}, methods: []}}}}\n", "utf-8")
+    checked = avow("check", str(tmp_path), cwd=tmp_path)
+    assert (checked.returncode == 2, "error[DRIVE108]" in checked.stdout) == (bool(said), bool(said)), checked.stdout
+    if said:
+        assert f"plan.yaml:1:{column}\n" in checked.stdout
+        assert f"help: {said}\n" in checked.stdout
+    if said and "kind" in source:
+        driven = avow("drive", str(tmp_path), "a", cwd=tmp_path)
+        assert (driven.returncode, "DRIVE108" in driven.stderr) == (2, True), driven.stderr
+
+
 def test_a_name_that_nothing_defines(tmp_path: Path) -> None:
     found = told(tmp_path, "print(os.sep, rclpi)", "def f(self): return unknown")
     assert found == [
@@ -102,12 +134,19 @@ def test_a_name_that_nothing_defines(tmp_path: Path) -> None:
         ("from own.msg import Load as L, Box", []),
         ("from other.msg import Anything", []),
         ("from .own.msg import Laod", []),
+        ("from own.srv import Sett", [("DRIVE107", "did you mean `Set`?")]),
+        ("from own.srv import Set, Box", [("DRIVE107", "known: Set")]),
+        ("from own.action import Trun", [("DRIVE107", "did you mean `Turn`?")]),
     ],
 )
 def test_a_message_that_its_package_does_not_have(tmp_path: Path, imported: str, said: list[tuple[str, str]]) -> None:
     (tmp_path / "msg/own/msg").mkdir(parents=True)
     for name in ("Load", "Box"):
         (tmp_path / f"msg/own/msg/{name}.msg").write_text("float64 data\n", "utf-8")
+    (tmp_path / "msg/own/srv").mkdir()
+    (tmp_path / "msg/own/srv/Set.srv").write_text("bool on\n---\nbool done\n", "utf-8")
+    (tmp_path / "msg/own/action").mkdir()
+    (tmp_path / "msg/own/action/Turn.action").write_text("bool on\n---\nbool done\n---\nbool now\n", "utf-8")
     (tmp_path / "system.rcl").write_text(CONTRACT, "utf-8")
     (tmp_path / "a.py").write_text(f"{imported}\n\n\nclass A:\n    pass\n", "utf-8")
     plan = "messages: [msg]\nros: {distro: humble}\nnodes: {a: {source: {python: a.py, class: A}, methods: []}}\n"

@@ -64,6 +64,7 @@ def test_scalars_are_never_guessed(text: str, value: object) -> None:
         ("system: 'a/../b'\n", 1, 9, "right form (expected: a name of letters, digits, `_` and `-`, first a letter)"),
         ('system: "a\\n"\n', 1, 9, "right form"),
         ("connections:\n  - {from: a.x, to: b.x, delayed: yes}\n", 2, 35, "true or false is wanted"),
+        ("connections:\n  - {from: a.x, to: b.x, delayed: yes, initial: 0}\n", 2, 35, "true or false is wanted"),
         ("connections:\n  - {from: a, to: b.x}\n", 2, 12, "node.port"),
         ("connections:\n  - {to: b.x}\n", 2, 5, "'from' is missing"),
         ("connections:\n  - {from: a.x, to: b.x, initial: 3}\n", 2, 5, "the key 'delayed' is missing"),

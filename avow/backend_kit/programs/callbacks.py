@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import math
 import random
@@ -15,7 +16,7 @@ from typing import Any
 
 from avow.backend_kit.programs.cpython import Replies, Subject, ask
 from avow.backend_kit.programs.samples import Pool, leaves, numbers_of, pool, words_of, written
-from avow.base.diagnostics import Diagnostic, Rejected, Span
+from avow.base.diagnostics import Diagnostic, Rejected, Span, refuse
 from avow.base.files import inside, read_text
 from avow.base.process import ToolMissing
 from avow.base.suggestions import did_you_mean, nearest, suggest
@@ -27,6 +28,7 @@ from avow.ros.bags import fields_of
 from avow.ros.calls import CALL, is_part
 from avow.ros.definitions import HEADER, INTEGERS, Array, Definitions, Field, Message, Nested, Scalar, Wire, canonical
 from avow.ros.sources import definitions, require
+from avow.system.driven import source_faults
 from avow.system.node_plan import parameter_place, parameters
 from avow.system.plan import Driving, Source, System
 from avow.system.topics import whole_name
@@ -211,14 +213,14 @@ def driver(system: System, name: str) -> Driver:
     if source is None or not source.python:
         hint = "source: {python: src/node.py, class: Node, kind: rclpy}, or kind: rospy"
         raise Rejected(Diagnostic("DRIVE100", f"the plan names no program for the node {node.name}", hint=hint))
-    place = source.place.at("source")
     if source.kind is Driving.STEP:
         text = f"kind is step, by default: {source.class_name} is driven by its method step, and has no topics"
-        raise Rejected(Diagnostic("DRIVE100", text, place, hint="add `kind: rclpy` or `kind: rospy` for callbacks"))
+        raise Rejected(Diagnostic("DRIVE100", text, source.place.at("source"), hint="add `kind: rclpy`, or rospy"))
     root = plan.root.resolve()
     path = inside(root, source.python)
-    if path is None or not path.is_file():
-        raise Rejected(Diagnostic("DRIVE100", f"there is no file `{source.python}` in the system's folder", place))
+    assert path is not None  # or the plan would not load
+    with contextlib.suppress(SyntaxError, ValueError, RecursionError):
+        refuse(source_faults(source, path))
     placed = plan.ros.names.placed(node.name)
     params, faults = parameters(root, source, placed.name)
     if faults:

@@ -87,14 +87,6 @@ class Parsed:
         )
 
 
-class WrongLaunch(Exception):  # noqa: N818 - it is what was found wrong
-    """A text that is not a launch file; `line` and `column` count from 1."""
-
-    def __init__(self, message: str, line: int, column: int = 1, hint: str | None = None) -> None:
-        super().__init__(message)
-        self.line, self.column, self.hint = line, column, hint
-
-
 def place(file: str, line: int, column: int = 1) -> Span:
     return Span(file, line, column, line, column + 1)
 

@@ -6,14 +6,14 @@ from xml.parsers import expat
 
 import yaml
 
-from avow.base.diagnostics import Span
-from avow.base.malformed import Fault, xml_fault, yaml_fault
+from avow.base.diagnostics import Malformed, Span
+from avow.base.malformed import xml_fault, yaml_fault
 from avow.base.tuning.sizes import LAUNCH_DEPTH, LAUNCH_ELEMENTS
-from avow.ros.launch.elements import Element, Parsed, Text, WrongLaunch, place, unread
+from avow.ros.launch.elements import Element, Parsed, Text, place, unread
 
 
 def from_xml(text: str, file: str) -> Parsed:
-    """Raises WrongLaunch."""
+    """Raises Malformed."""
     parser = expat.ParserCreate()
     stack: list[tuple[str, dict[str, Text], list[Element], Span]] = []
     roots: list[Element] = []
@@ -23,7 +23,7 @@ def from_xml(text: str, file: str) -> Parsed:
         nonlocal count
         count += 1
         if len(stack) > LAUNCH_DEPTH or count > LAUNCH_ELEMENTS:
-            raise WrongLaunch("it has too many elements, or too many within one another", parser.CurrentLineNumber)
+            raise Malformed("it has too many elements, or too many within one another", parser.CurrentLineNumber)
         at = place(file, parser.CurrentLineNumber, parser.CurrentColumnNumber + 1)
         stack.append((tag.replace("-", "_"), dict(attributes), [], at))
 
@@ -32,7 +32,7 @@ def from_xml(text: str, file: str) -> Parsed:
         (stack[-1][2] if stack else roots).append(Element(name, attributes, tuple(children), at))
 
     def doctype(*_: object) -> None:
-        raise WrongLaunch("a document type has no place in a launch file", parser.CurrentLineNumber)
+        raise Malformed("a document type has no place in a launch file", parser.CurrentLineNumber)
 
     parser.StartElementHandler = begin
     parser.EndElementHandler = end
@@ -40,30 +40,26 @@ def from_xml(text: str, file: str) -> Parsed:
     try:
         parser.Parse(text, True)
     except expat.ExpatError as error:
-        raise _wrong(xml_fault(text, error)) from None
+        raise xml_fault(text, error) from None
     if not roots or roots[0].tag != "launch":
-        raise WrongLaunch("the outermost element of a launch file is <launch>", 1)
+        raise Malformed("the outermost element of a launch file is <launch>", 1)
     return Parsed(roots[0].children)
 
 
 def from_yaml(text: str, file: str) -> Parsed:
-    """Raises WrongLaunch."""
+    """Raises Malformed."""
     try:
         root = yaml.compose(text, Loader=yaml.SafeLoader)
     except yaml.YAMLError as error:
-        raise _wrong(yaml_fault(text, error)) from None
+        raise yaml_fault(text, error) from None
     except RecursionError:
-        raise WrongLaunch("it is nested too deeply", 1) from None
+        raise Malformed("it is nested too deeply", 1) from None
     entries = root.value if isinstance(root, yaml.MappingNode) else []
     top = next((value for key, value in entries if key.value == "launch"), None)
     if top is None:
-        raise WrongLaunch("a launch file in YAML begins with `launch:`", 1)
+        raise Malformed("a launch file in YAML begins with `launch:`", 1)
     work = _Yaml(file)
     return Parsed(tuple(work.listed(top, 0)), work.parsed.unread)
-
-
-def _wrong(fault: Fault) -> WrongLaunch:
-    return WrongLaunch(fault.message, fault.line, fault.column, fault.hint)
 
 
 class _Yaml:
@@ -78,7 +74,7 @@ class _Yaml:
     def listed(self, node: yaml.Node, depth: int) -> list[Element]:
         """A list of ``- tag: {…}``, each with one key."""
         if not isinstance(node, yaml.SequenceNode):
-            raise WrongLaunch("a list of actions is wanted here", node.start_mark.line + 1)
+            raise Malformed("a list of actions is wanted here", node.start_mark.line + 1)
         found: list[Element] = []
         for item in node.value:
             if isinstance(item, yaml.MappingNode) and len(item.value) == 1:
@@ -91,7 +87,7 @@ class _Yaml:
     def element(self, tag: str, node: yaml.Node, at: Span, depth: int) -> Element:
         self.count += 1
         if depth > LAUNCH_DEPTH or self.count > LAUNCH_ELEMENTS:
-            raise WrongLaunch("it has too many elements, or too many within one another", at.line)
+            raise Malformed("it has too many elements, or too many within one another", at.line)
         name = tag.replace("-", "_")
         if isinstance(node, yaml.SequenceNode):  # group: [...]
             return Element(name, {}, tuple(self.listed(node, depth + 1)), at)

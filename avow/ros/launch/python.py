@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import field
 from pathlib import Path
 
-from avow.base.diagnostics import Diagnostic, Span
+from avow.base.diagnostics import Diagnostic, Malformed, Span
 from avow.base.python_names import unbound
 from avow.base.records import dataclass
 from avow.base.suggestions import nearest
@@ -24,7 +24,6 @@ from avow.ros.launch.elements import (
     Parsed,
     Text,
     Unread,
-    WrongLaunch,
     joined,
     literal,
     unread,
@@ -98,13 +97,13 @@ _MODULES = {
 
 
 def from_python(text: str, file: str) -> Parsed:
-    """Raises WrongLaunch."""
+    """Raises Malformed."""
     try:
         return _Python(file, ast.parse(text)).parsed()
     except SyntaxError as error:
-        raise WrongLaunch(f"this is not Python: {error.msg}", error.lineno or 1) from None
+        raise Malformed(f"this is not Python: {error.msg}", error.lineno or 1, error.offset or 1) from None
     except (RecursionError, ValueError, MemoryError):
-        raise WrongLaunch("this is not Python that can be read", 1) from None
+        raise Malformed("this is not Python that can be read", 1) from None
 
 
 @dataclass(slots=True)
@@ -123,7 +122,7 @@ class _Python:
             s for s in self.module.body if isinstance(s, ast.FunctionDef) and s.name == "generate_launch_description"
         ]
         if len(top) != 1:
-            raise WrongLaunch("a launch file in Python defines generate_launch_description() once", 1)
+            raise Malformed("a launch file in Python defines generate_launch_description() once", 1)
         counts = _bindings(self.module)
         result: ast.expr | None = None
         for statement in (*self.module.body, *top[0].body):
@@ -408,7 +407,7 @@ class _Python:
     def step(self, node: ast.expr) -> None:
         self.steps += 1
         if self.steps > LAUNCH_ELEMENTS:
-            raise WrongLaunch("it says more than can be read", getattr(node, "lineno", 1))
+            raise Malformed("it says more than can be read", getattr(node, "lineno", 1))
 
     def at(self, node: ast.expr | ast.stmt) -> Span:
         return Span(self.file, node.lineno, node.col_offset + 1, node.end_lineno or 0, (node.end_col_offset or 0) + 1)

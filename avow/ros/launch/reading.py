@@ -14,12 +14,12 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import field, replace
 from pathlib import Path
 
-from avow.base.diagnostics import Diagnostic
+from avow.base.diagnostics import Diagnostic, Malformed
 from avow.base.files import read_regular, read_text
 from avow.base.records import dataclass
 from avow.base.suggestions import suggest
 from avow.base.tuning.sizes import LAUNCH_BYTES, LAUNCH_DEPTH, LAUNCH_ELEMENTS, PACKAGES_SEARCHED
-from avow.ros.launch.elements import HINT, NODES, SILENT, Element, Parsed, Text, Unread, WrongLaunch, place, unread
+from avow.ros.launch.elements import HINT, NODES, SILENT, Element, Parsed, Text, Unread, place, unread
 from avow.ros.launch.overrides import overrides
 from avow.ros.launch.python import from_python
 from avow.ros.launch.started import Launched, Setting, Started, with_server
@@ -94,7 +94,7 @@ class _Reading:
         self.files[path] = None
         try:
             parsed = _parsed(path)
-        except WrongLaunch as wrong:
+        except Malformed as wrong:
             at = place(str(path), wrong.line, wrong.column)
             self.unread.append(Diagnostic("ROS120", f"{path.name}: {wrong}", at, hint=wrong.hint))
             return False
@@ -448,10 +448,10 @@ def _within(namespace: str, name: str) -> str:
 def _parsed(path: Path) -> Parsed:
     try:
         if path.stat().st_size > LAUNCH_BYTES:
-            raise WrongLaunch(f"it has more than {LAUNCH_BYTES} bytes", 1)
+            raise Malformed(f"it has more than {LAUNCH_BYTES} bytes", 1)
         text = read_text(path, "utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
-        raise WrongLaunch(f"it cannot be read: {error}", 1) from None
+        raise Malformed(f"it cannot be read: {error}", 1) from None
     from avow.ros.launch.markup import from_xml, from_yaml  # PyYAML is slow to import
 
     match path.suffix:
