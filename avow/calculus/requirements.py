@@ -100,7 +100,14 @@ class FormulaQuestion:
             more = composes(frame, system_term(frame, spoken), answer.established)
             answer = replace(answer, details={**answer.details, COMPOSES: more})
         why = why or (self.dead_condition(composition, bounds) if self.name in frame.observed else "")
-        return _says_nothing(answer, why or self.unused_support(frame, answer, assumed))
+        listed = answer.details.get("needed")
+        labels = tuple(map(str, listed)) if isinstance(listed, list) else ()
+        used = _guarantees(frame, labels)
+        if why := why or self.unused_support(used, labels, assumed):
+            return _says_nothing(answer, why)
+        unnamed = [name for name in used if self.support and name not in self.support]
+        told = f"; `supported_by` does not name {', '.join(unnamed)}: add what it rests on" if unnamed else ""
+        return replace(answer, summary=answer.summary + told)
 
     def dead_condition(self, composition: Composition, bounds: Bounds) -> str:
         """Why a condition of a formula about other steps never comes about; otherwise empty. The condition's absence is
@@ -116,11 +123,8 @@ class FormulaQuestion:
                 return f"its condition never comes about: {show_term(trigger)} is excluded: {answer.summary}"
         return ""
 
-    def unused_support(self, frame: Frame, answer: Answer, assumed: Mapping[str, Term]) -> str:
+    def unused_support(self, used: Sequence[str], labels: Sequence[str], assumed: Mapping[str, Term]) -> str:
         """Why the proof of a formula uses no guarantee, or none that the plan names as its support; otherwise empty."""
-        listed = answer.details.get("needed")
-        labels = tuple(map(str, listed)) if isinstance(listed, list) else ()
-        used = _guarantees(frame, labels)
         needed = {label.removesuffix(" one step before") for label in labels} - {self.name}
         if needed and not used and needed <= assumed.keys():
             alone = ", ".join(sorted(needed))

@@ -82,3 +82,18 @@ def test_what_some_design_would_break_is_one(tmp_path: Path, what: str) -> None:
     outcome = asked(tmp_path, what)
     assert outcome.verdict in (Verdict.PROVED, Verdict.CHECKED), outcome.summary
     assert not outcome.vacuous, outcome.summary
+
+
+@pytest.mark.parametrize(
+    ("support", "told"),
+    [
+        ("[brake]", "`supported_by` does not name sensor.high: add what it rests on"),
+        ("[sensor.high]", "`supported_by` does not name brake.pulls: add what it rests on"),
+        ("[sensor.high, brake.pulls]", ""),
+        ("[]", ""),
+    ],
+)
+def test_a_proof_names_the_guarantees_that_it_uses_beyond_the_plans(tmp_path: Path, support: str, told: str) -> None:
+    outcome = asked(tmp_path, f'formula: "sensor.r >= 10 -> brake.on", supported_by: {support}')
+    assert (outcome.verdict, outcome.vacuous) == (Verdict.PROVED, False)
+    assert outcome.summary.partition("; ")[2] == told
