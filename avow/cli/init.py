@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from importlib import resources
 from pathlib import Path
@@ -53,11 +54,13 @@ def command(
     topics, types and mapping, for you to correct; what a node promises is left to write. Where DIRECTORY is a new
     folder in a workspace's contracts/, only the system is made.
     """
-    if directory.exists() and any(directory.iterdir()):
-        raise Rejected(
-            Diagnostic("CLI007", f"{directory} is not empty", hint="give the name of a new folder, or of an empty one")
-        )
     drafted = bag is not None or graph is not None
+    if directory.exists() and any(directory.iterdir()):
+        hint = "give the name of a new folder, or of an empty one"
+        if drafted and (place := find_workspace(directory.resolve())) is not None:
+            new = quote(os.path.relpath(place.contracts / f"{directory.resolve().name}_new"))
+            hint = f"draft again beside it, and compare: `avow init {new}` with the same options"
+        raise Rejected(Diagnostic("CLI007", f"{directory} is not empty", hint=hint))
     if drafted and template is not None:
         raise click.UsageError("a draft has no template: leave --template out")
     if not drafted and (distro is not None or messages):
@@ -113,6 +116,7 @@ def _told(directory: Path, system: str, next_: str, as_json: bool) -> int:
         click.echo(document({"workspace": str(directory), "systems": [system], "next": next_}))
         return 0
     go = "" if directory.resolve() == Path.cwd() else f"  cd {quote(str(directory))}\n"
+    made = "a system" if directory.resolve().parent.name == "contracts" else "a workspace with one system"
     where = system if directory.name == system else f"contracts/{system}"
-    click.echo(f"{directory}: a workspace with one system, {where}\n\nnext:\n{go}  {next_}")
+    click.echo(f"{directory}: {made}, {where}\n\nnext:\n{go}  {next_}")
     return 0

@@ -116,7 +116,7 @@ class Histories(Terms):
             self.error("RCL323", "the limit of `since` says whether it is the most or the least", limit, hint=hint)
             return False
         if operator not in LIMITED:
-            self.error("RCL323", f"`{operator}` has no limit", limit)
+            self.error("RCL323", f"`{operator}` has no limit", limit, hint=f"write `{operator}(…)`")
             return False
         if limit.relation:
             hint = f"write `{operator}[{self.text(limit.amount)}{f' {limit.unit.text}' if limit.unit else ''}](…)`"
@@ -213,8 +213,8 @@ class Histories(Terms):
     ) -> Limit | None:
         number = constant(term)
         if number is None or number < 0:
-            message = f"a limit is the same at every step and not negative, and `{self.text(tree.amount)}` is not"
-            hint = "write a number or a declared constant; to choose between limits, write a clause for each"
+            message = f"`{self.text(tree.amount)}` is no limit: it is a number from 0, calculated by `+ - * /` only"
+            hint = "write the number itself or a declared constant; to choose between limits, write a clause for each"
             self.error("RCL323", message, tree.amount, hint=hint)
             return None
         amount = Literal(int(number), NATURAL, term.span) if steps else Literal(number * scale, REAL, term.span)

@@ -50,7 +50,10 @@ class OnnxBackend(Backend):
 
     def unsaid(self, node: Node, clause: Clause) -> str | None:
         refused = next((a for a in node.assumptions if histories(a.formula)), None)
-        return refusal(self.name, node, refused or clause) if refused or not compares_steps(clause.formula) else None
+        if refused or compares_steps(clause.formula):
+            return refusal(self.name, node, refused) if refused else None
+        others = f"onnx compares a step with the one before, and {node.name}.{clause.name} speaks of others"
+        return f"{others}: write `previous` of values of this step, without another operator on steps in or beside it"
 
     def check(self, job: Job) -> tuple[Diagnostic, ...]:
         try:

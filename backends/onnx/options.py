@@ -117,7 +117,9 @@ def _entries(
         if name in known:
             yield option, (name, known[name], entry)
         else:
-            hint = suggest(name, known)
+            fixed = name in (port.variable.qualified for port in job.node.fixed)
+            told = "the plan gives this parameter its value: leave it out here, or declare it without `parameter`"
+            hint = told if fixed else suggest(name, known)
             faults.append(_fault(job, option, f"'{name}' is none of {', '.join(known)}", hint))
 
 

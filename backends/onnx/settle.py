@@ -79,7 +79,7 @@ class _Work:
             try:
                 cases, unused = denials(claim.formula, claim.assumed.values(), claim.given)
             except NotLinear as part:
-                why = f"{part} is not linear over connected ports, so this method has no question for it"
+                why = f"{part} is not linear over connected ports: connect its ports, or write sums"
                 return Outcome(obligation.id, Verdict.UNKNOWN, why), ""
             count, left = count + len(cases), [*left, *unused]
             replace(self, given=claim.given).search(obligation, claim, cases, found)

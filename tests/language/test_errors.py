@@ -107,10 +107,11 @@ def test_codes_without_example_are_few() -> None:
         ("stat == red && TRUE", r"RCL101 .*\[write `and`\]"),
         ("∀ stat", "RCL101"),
         ("stat == réd", "RCL107"),
-        ("rose(in.both) -> within[in.k steps](stat == red)", r"RCL323 .* `in.k` is not \[write a number or a declared"),
+        ("rose(in.both) -> within[in.k steps](stat == red)", r"RCL323 `in.k` is no limit.* \[write the number"),
         ("once[in.r](in.both)", "RCL323"),
+        ("once[sqrt(4) s](in.both)", r"RCL323 `sqrt.4.` is no limit: .* by `\+ - \* /` only \[write the num"),
         ("forall(i in NATURAL | held[i steps](in.both))", "RCL323"),
-        ("in.both since[< (Limit - 4) s] stat == red", "RCL323 .*not negative, and `.Limit - 4.` is not"),
+        ("in.both since[< (Limit - 4) s] stat == red", "RCL323 `.Limit - 4.` is no limit: it is a number from 0"),
     ],
 )
 def test_messages(formula: str, message: str) -> None:

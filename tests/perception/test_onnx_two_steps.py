@@ -72,13 +72,11 @@ def test_a_counterexample_shows_both_steps(tmp_path: Path) -> None:
     assert values["out.z"] < values["out.z before"]
 
 
-@pytest.mark.parametrize(
-    ("formula", "word"),
-    [("once(out.near) -> out.z >= 0", "once"), ("out.z >= previous(previous(out.z, 0), 0)", "previous")],
-)
-def test_what_speaks_of_more_steps_is_refused(formula: str, word: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize("formula", ["once(out.near) -> out.z >= 0", "out.z >= previous(previous(out.z, 0), 0)"])
+def test_what_speaks_of_more_steps_is_refused(formula: str, tmp_path: Path) -> None:
     found = judged(tmp_path, formula, IDENTITY)
-    assert (found.verdict, f"has no `{word}`" in found.summary) == (Verdict.UNKNOWN, True)
+    assert found.verdict is Verdict.UNKNOWN
+    assert "detector.g speaks of others: write `previous` of values of this step," in found.summary
 
 
 def test_an_assumption_about_two_steps_is_refused(tmp_path: Path) -> None:

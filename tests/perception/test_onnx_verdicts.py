@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from helpers import avow
 from perception.networks import drawn, graph, network, onnx, warner
 
 from avow.backend_kit.protocol import Limits, Report
@@ -184,6 +185,7 @@ def test_what_is_not_linear_is_unknown(formula: str, tmp_path: Path) -> None:
     found = judged(tmp_path, formula, IDENTITY)
     assert found.verdict is Verdict.UNKNOWN
     assert "not linear" in found.summary
+    assert "connect its ports, or write sums" in found.summary
 
 
 # -- the file ----------------------------------------------------------------------------------------------------------
@@ -219,6 +221,22 @@ def test_operators_as_in_onnxruntime(tmp_path: Path) -> None:
     for _ in range(20):
         assert runtime.compare(tuple(draw.normal(size=25).astype(np.float32).tolist()))
     assert runtime.difference < 1e-4
+
+
+def test_a_parameter_is_no_input_of_the_network(tmp_path: Path) -> None:
+    """Neither before the plan gives it a value, nor after."""
+    (tmp_path / "net.onnx").write_bytes(IDENTITY)
+    (tmp_path / "system.rcl").write_text(
+        "node d { inputs( x : REAL, parameter limit : REAL ) outputs( z : REAL ) topics() "
+        "guarantee g ( out.z <= in.limit + in.x ) }"
+    )
+    onnx = "methods: [{onnx: {network: net.onnx, inputs: {in.x: 0, in.limit: 1}, outputs: {out.z: 0}}}]"
+    for given, told in (
+        ("", "onnx needs a value of limit: write it under nodes.d.parameters"),
+        ("parameters: {limit: 3}, ", "leave it out here, or declare it without `parameter`"),
+    ):
+        (tmp_path / "plan.yaml").write_text(f"nodes: {{d: {{{given}{onnx}}}}}\n")
+        assert told in avow("check", str(tmp_path), cwd=tmp_path).stdout
 
 
 def test_each_fault_is_reported(tmp_path: Path) -> None:

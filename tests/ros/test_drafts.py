@@ -264,6 +264,25 @@ def test_what_is_no_graph_drafts_nothing(tmp_path: Path, text: str) -> None:
     assert not (tmp_path / "w").exists()
 
 
+def test_another_draft_goes_beside_the_first(tmp_path: Path) -> None:
+    """A second bag, or a changed robot: what was written stays, and the command that drafts again works."""
+    (tmp_path / "nodes.txt").write_text("/a\n  Publishers:\n    /x: std_msgs/msg/Bool\n")
+    options = ("--from-graph", str(tmp_path / "nodes.txt"), "--distro", "humble")
+    assert avow("init", "robot", *options, cwd=tmp_path).returncode == 0
+    for taken, new in (("robot", "robot/contracts/robot_new"), ("robot/contracts/robot_new", "")):
+        again = avow("init", taken, *options, cwd=tmp_path)
+        assert (again.returncode, "CLI007" in again.stderr) == (2, True)
+        found = re.search(r"`avow init (\S+)` with the same options", again.stderr)
+        assert found is not None
+        assert not new or found[1] == new
+        made = avow("init", found[1], *options, cwd=tmp_path)
+        assert (made.returncode, made.stdout.partition("\n")[0]) == (0, f"{found[1]}: a system, {Path(found[1]).name}")
+        assert avow("check", Path(found[1]).name, cwd=tmp_path / "robot").returncode == 0
+    (tmp_path / "other").mkdir()
+    (tmp_path / "other/a").write_text("")
+    assert "give the name of a new folder" in avow("init", "other", *options, cwd=tmp_path).stderr
+
+
 def test_the_folder_to_go_to_is_quoted(tmp_path: Path) -> None:
     assert f"  cd '{tmp_path}/my robot'\n" in CliRunner().invoke(init, [str(tmp_path / "my robot")]).output
 
