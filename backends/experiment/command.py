@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from itertools import takewhile
 from typing import Any
@@ -18,8 +18,10 @@ from avow.base.plain import count
 from avow.base.process import ToolMissing
 from avow.base.suggestions import suggest
 from avow.base.verdict import Outcome, Verdict
-from avow.base.workspace import system_folder
+from avow.base.workspace import find_workspace, system_folder
+from avow.evidence.ledger import ledger_of
 from avow.evidence.obligation import Kind, Obligation
+from avow.evidence.record import CASE
 from avow.system.load import load_system
 from avow.system.plan import System
 
@@ -146,9 +148,16 @@ class _Work:
             _shown(outcome) for outcome in self.outcomes().values()
         )
 
-    def outcomes(self) -> dict[str, Outcome]:
+    def outcomes(self, kept: Callable[[Obligation], Iterable[Any]] = lambda _: ()) -> dict[str, Outcome]:
         whole = experiment(self.job, self.made, self.again)
-        return {o.name: settle(o.name, whole, ())[0] for o in self.job.obligations} if self.made else {}
+        return {o.name: settle(o.name, whole, kept(o))[0] for o in self.job.obligations} if self.made else {}
+
+    def shown(self) -> dict[str, Outcome]:
+        """As `avow verify` finds them: it does not forget a failing run whose row was removed."""
+        place = find_workspace(self.job.root)
+        ledger = ledger_of(place.ledger(self.job.system.name)) if place is not None else None
+        entries = ledger.refutations if ledger is not None else lambda *_: ()
+        return self.outcomes(lambda o: [e.evidence.details[CASE] for e in entries(o.id, o.digest, "experiment")])
 
     def search(self, runs: int) -> None:
         self.searched = search(self.campaign.parameters, self.attempt, runs, self.campaign.seed)
@@ -175,11 +184,11 @@ class _Work:
         if self.searched is not None:
             return self.searched.failing is None and self.excused < self.searched.runs
         whole = "at_least" not in self.job.options or len(self.made) == self.campaign.runs
-        return whole and bool(self.made) and all(map(_shown, self.outcomes().values()))
+        return whole and bool(self.made) and all(map(_shown, self.shown().values()))
 
     def text(self) -> Iterator[str]:
         node = self.job.node.name
-        for name, outcome in self.outcomes().items():
+        for name, outcome in self.shown().items():
             word = "vacuous" if outcome.vacuous else outcome.verdict.value
             yield f"{node}.{name}: {word}: {outcome.summary}"
         if self.made and (worst := min(self.made, key=_distance)).distances:
@@ -203,7 +212,7 @@ class _Work:
             "node": self.job.node.name,
             "runs": [_data(made) for made in self.made],
             "regressions": [_data(made) for made in self.again],
-            "verdicts": {name: [one.verdict.value, one.summary] for name, one in self.outcomes().items()},
+            "verdicts": {name: [one.verdict.value, one.summary] for name, one in self.shown().items()},
             "searched": None if searched is None else {"runs": searched.runs, "failing": searched.failing},
         }
 

@@ -282,6 +282,22 @@ def test_a_failing_scenario_is_found_simplified_and_kept(drawn: Path) -> None:
 
 
 @pytest.mark.slow
+def test_a_removed_regression_is_missed_by_campaign_and_verify_alike(tmp_path: Path) -> None:
+    root = made(tmp_path / "contracts/brakes")
+    (tmp_path / "dodo.py").write_text("")
+    edit(root / "world.py", FAULT)
+    campaign(root, "--search", code=1)
+    campaign(root, code=1)
+    assert avow("verify", cwd=tmp_path).returncode == 1
+    edit(root / "world.py", FAULT[::-1])
+    assert "brake.stops: tested" in campaign(root)
+    (root / "data/runs_regressions.csv").unlink()
+    told = campaign(root, code=1)
+    assert "brake.stops: unknown: runs that failed before are missing in the data" in told
+    assert "put them back, or name them under 'left_out'" in told
+
+
+@pytest.mark.slow
 def test_a_claimed_rate_gets_every_run_of_the_plan(tmp_path: Path) -> None:
     root = made(tmp_path)
     edit(root / "plan.yaml", ("seconds: 5", "seconds: 5\n          at_least: 0.8"))
