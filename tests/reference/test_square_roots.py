@@ -168,9 +168,9 @@ def test_engines_agree_with_the_reference(seeds: range) -> None:
             said = ask_z3(text.script(parts), 1_000_000)
             assert said in (Reply.SAT if held else Reply.UNSAT, Reply.UNKNOWN), shown
             told[f"kernel {said is not Reply.UNKNOWN}"] += 1
-    assert told["evaluated"] > 10 * told["not evaluated"], told
-    assert told["solver True"] > 10 * told["solver False"], told
-    assert told["kernel True"] > 10 * told["kernel False"], told
+    assert told["evaluated"] >= 10 * told["not evaluated"], told
+    assert told["solver True"] >= 10 * told["solver False"], told
+    assert told["kernel True"] >= 10 * told["kernel False"], told
 
 
 def _parts(term: t.Term) -> Iterator[t.Term]:
