@@ -7,6 +7,7 @@ codes.
 
 from __future__ import annotations
 
+from collections import ChainMap
 from collections.abc import Iterator, Mapping
 from functools import cache, cached_property
 from typing import Any
@@ -64,6 +65,10 @@ def declare(code: str, title: str, explanation: str, remedy: str, *, warning: bo
     return Code(code, title, explanation, "", Severity.WARNING if warning else Severity.ERROR, remedy)
 
 
+_LOADED: list[Mapping[str, Code]] = []
+"""The codes of the core and of the backends that are loaded."""
+
+
 def register(*codes: Code) -> dict[str, Code]:
     """Codes by name, in order. Raises ValueError if one is declared twice."""
     found: dict[str, Code] = {}
@@ -71,6 +76,7 @@ def register(*codes: Code) -> dict[str, Code]:
         if code.code in found:
             raise ValueError(f"{code.code} is declared twice")
         found[code.code] = code
+    _LOADED.append(found)
     return found
 
 
@@ -78,16 +84,12 @@ LANGUAGE = "The language"
 """The section with the codes of contracts."""
 
 
-_CATALOGUES: list[Mapping[str, Code]] = []
-"""Of the backends that are loaded."""
-
-
 class Catalogue(Mapping[str, Code]):
     """The codes that the ``codes.yaml`` of a package declares, read when first needed."""
 
     def __init__(self, package: str) -> None:
         self._package = package
-        _CATALOGUES.append(self)
+        _LOADED.append(self)
 
     @cached_property
     def _codes(self) -> Mapping[str, Code]:
@@ -129,11 +131,17 @@ def core_codes() -> Mapping[str, Code]:
     return register(*(code for codes in sections().values() for code in codes.values()))
 
 
+def known() -> Mapping[str, Code]:
+    """The codes of the core and of the backends that are loaded, as the backend of every diagnostic is."""
+    core_codes()
+    return ChainMap(*_LOADED)  # type: ignore[arg-type]
+
+
 def advice(found: Diagnostic) -> str:
     """What to do about a finding: its hint, otherwise the remedy of its code. Empty for a note without a hint."""
     if found.hint or found.severity is Severity.NOTE:
         return found.hint or ""
-    text = next((codes[found.code].remedy for codes in (core_codes(), *_CATALOGUES) if found.code in codes), "")
+    text = known()[found.code].remedy if found.code in known() else ""
     return (text[:1].lower() if text[1:2].islower() else text[:1]) + text[1:].removesuffix(".")
 
 

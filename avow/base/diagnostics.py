@@ -66,9 +66,17 @@ def refuse(found: Iterable[Diagnostic]) -> None:
         raise Rejected(*errors)
 
 
-class Malformed(Exception):  # noqa: N818 - it is what was found wrong
+class Hinted(Exception):  # noqa: N818 - it is what was found wrong
+    """What was found wrong, and a remedy if there is one."""
+
+    def __init__(self, message: str, hint: str | None = None) -> None:
+        super().__init__(message)
+        self.hint = hint
+
+
+class Malformed(Hinted):
     """A text that is not what it should be: its first fault. `line` and `column` count from 1."""
 
     def __init__(self, message: str, line: int = 1, column: int = 1, hint: str | None = None) -> None:
-        super().__init__(message)
-        self.line, self.column, self.hint = line, column, hint
+        super().__init__(message, hint)
+        self.line, self.column = line, column

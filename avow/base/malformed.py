@@ -15,8 +15,10 @@ from avow.base.packaged import packaged
 # -- YAML --------------------------------------------------------------------------------------------------------------
 
 
-def yaml_fault(text: str, error: yaml.YAMLError) -> Malformed:
+def yaml_fault(text: str, error: yaml.YAMLError | RecursionError) -> Malformed:
     """`error`: what PyYAML raised for the text."""
+    if isinstance(error, RecursionError):
+        return Malformed("nested too deeply")
     if isinstance(error, yaml.reader.ReaderError):
         before = text[: error.position]
         shown = f"character U+{ord(text[error.position]):04X}" if error.position < len(text) else "a character"

@@ -14,7 +14,7 @@ from pathlib import Path, PurePath
 from typing import Any
 from urllib.parse import quote
 
-from avow.base.codes import Code, advice, core_codes
+from avow.base.codes import advice, known
 from avow.base.diagnostics import Diagnostic, Severity, Span
 from avow.base.plain import count
 from avow.base.records import dataclass
@@ -169,20 +169,16 @@ def _shown(d: Diagnostic) -> ShownDiagnostic:
     return ShownDiagnostic(s.file, s.line, s.column, s.end_line, s.end_column, *said)
 
 
-def to_sarif(
-    diagnostics: Sequence[Diagnostic], *, version: str = "", codes: Mapping[str, Code] | None = None
-) -> dict[str, Any]:
-    """A SARIF 2.1.0 log with one run; `codes` (by default the core's) describe its rules. Paths are kept as given:
-    relative ones are relative to the working folder."""
-    used, codes = sorted({d.code for d in diagnostics}), core_codes() if codes is None else codes
+def to_sarif(diagnostics: Sequence[Diagnostic], *, version: str = "") -> dict[str, Any]:
+    """A SARIF 2.1.0 log with one run. Paths are kept as given: relative ones are relative to the working folder."""
+    used, codes = sorted({d.code for d in diagnostics}), known()
     rules = []
     for code in used:
         rule: dict[str, Any] = {"id": code}
         if code in codes:
-            known = codes[code]
-            rule["shortDescription"] = {"text": known.title}
-            rule["fullDescription"] = {"text": known.explanation}
-            rule["defaultConfiguration"] = {"level": str(known.severity)}
+            rule["shortDescription"] = {"text": codes[code].title}
+            rule["fullDescription"] = {"text": codes[code].explanation}
+            rule["defaultConfiguration"] = {"level": str(codes[code].severity)}
         rules.append(rule)
     driver: dict[str, Any] = {"name": "avow", "rules": rules}
     if version:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import click
 
 from avow.base.codec import document
-from avow.base.codes import LANGUAGE, core_codes, is_lint, sections
+from avow.base.codes import LANGUAGE, is_lint, known, sections
 from avow.base.diagnostics import Diagnostic, Rejected, Severity, Span
 from avow.base.plain import count
 from avow.base.rendering import render, summary, to_sarif, told
@@ -20,7 +20,6 @@ from avow.base.workspace import system_folder
 from avow.cli.options import ContractArgument, json_option
 
 if TYPE_CHECKING:
-    from avow.base.codes import Code
     from avow.base.remembered import Shelf
 
 
@@ -64,7 +63,7 @@ def command(paths: tuple[Path, ...], as_json: bool, sarif: bool, off: tuple[str,
     if as_json:
         click.echo(document(told(found)))
     elif sarif:
-        click.echo(document(to_sarif(found, version=__version__, codes=_codes(found))))
+        click.echo(document(to_sarif(found, version=__version__)))
     else:
         if found:
             click.echo(render(found, colour=sys.stdout.isatty()))
@@ -75,19 +74,9 @@ def command(paths: tuple[Path, ...], as_json: bool, sarif: bool, off: tuple[str,
 
 
 def _explain(found: list[Diagnostic]) -> None:
-    codes = _codes(found)
-    for code in sorted({d.code for d in found} & set(codes)):
-        known = codes[code]
-        click.echo(f"{code} ({known.title}): {' '.join(filter(None, (known.explanation, known.remedy)))}\n")
-
-
-def _codes(found: list[Diagnostic]) -> Mapping[str, Code]:
-    """The known codes; those of backends only if one occurs."""
-    if all(d.code in core_codes() for d in found):
-        return core_codes()
-    from avow.backend_kit.registry import every_code
-
-    return every_code()
+    for code in sorted({d.code for d in found} & known().keys()):
+        said = known()[code]
+        click.echo(f"{code} ({said.title}): {' '.join(filter(None, (said.explanation, said.remedy)))}\n")
 
 
 def _groups(paths: tuple[Path, ...], found: list[Diagnostic]) -> list[tuple[list[Path], frozenset[str]]]:

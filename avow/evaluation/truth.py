@@ -27,6 +27,9 @@ def judge(term: Term, valuation: Mapping[str, Value], *, effort: int = 5_000) ->
     return replay([term], {v: valuation[v.qualified] for v in sorts.values()}, effort=effort)
 
 
+TOLERANCE = ": allow a tolerance in the clause, or see `numbers:`"
+
+
 def as_shown(term: Term, values: Mapping[str, Value]) -> str:
     """A note on a formula that values break and that holds of the digits by which the values are shown: the exact
     numbers, and what to do. Empty for any other formula."""
@@ -40,9 +43,7 @@ def as_shown(term: Term, values: Mapping[str, Value]) -> str:
         return ""
     exactly = (f"{n} is {held[n].digits} {'+-'[held[n] < v]} {float(abs(held[n] - v)):.2g}" for n, v in apart.items())
     told = ", ".join(exactly)
-    return (
-        f"; exactly, {told}, since no float is the decimal number: allow a tolerance in the clause, or see `numbers:`"
-    )
+    return f"; exactly, {told}, since no float is the decimal number{TOLERANCE}"
 
 
 def judge_open(term: Term, valuation: Mapping[str, Value], *, effort: int = 5_000) -> bool | None:

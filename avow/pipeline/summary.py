@@ -49,6 +49,7 @@ def print_summary(
         console.print("\n".join(results[0].lines), markup=False)
     else:
         console.print(table)
+    said: set[str] = set()
     for r in results:
         more = len(r.failed) - WARNINGS
         for text in (*r.failed[:WARNINGS], *([f"and {more} more methods without an answer"] if more > 0 else [])):
@@ -57,7 +58,7 @@ def print_summary(
         for title, passed, reason in r.gates:
             if not passed:
                 console.print(f"[red]✗[/] {r.system}: ", end="")
-                console.print(f"{title}: {_few(reason)}", markup=False)
+                console.print(f"{title}: {_few(reason, said)}", markup=False)
     for file, why in _left_out(results):
         console.print("[yellow]–[/] ", end="")
         console.print(printable(f"{file}: {why}"), markup=False)
@@ -93,12 +94,15 @@ def _left_out(results: Sequence[Result]) -> Iterable[tuple[str, str]]:
     return dict.fromkeys(row for r in results for row in r.left_out)
 
 
-def _few(reason: str) -> str:
-    """The reason, shortened for a terminal; the next step is kept."""
+def _few(reason: str, said: set[str]) -> str:
+    """The reason, shortened for a terminal; the next step is kept, unless another gate has `said` it."""
     why, mark, step = reason.partition("; next: ")
     if len(why) > GATE_REASON:
         why = f"{why[:GATE_REASON].rpartition(';')[0] or why[: GATE_REASON - 1] + '…'}; all in the report"
-    return why + mark + step.partition("; next: ")[0]
+    step = step.partition("; next: ")[0]
+    again = step in said
+    said.update({step} - {""})
+    return why + mark + ("as above" if again else step)
 
 
 def _gates(result: Result) -> str:

@@ -9,6 +9,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from avow.base.diagnostics import Hinted
 from avow.base.files import read_text
 from avow.base.records import dataclass
 from avow.ros.calls import CALL, Calls, as_message, parts_of, with_parts
@@ -40,12 +41,8 @@ WHOLE = "_message"
 SUFFIXES = (".bag", ".db3", ".mcap")
 
 
-class NoBag(Exception):  # noqa: N818 - it is what was found wrong
+class NoBag(Hinted):
     """The file is not a bag that can be read; the message says why."""
-
-    def __init__(self, message: str, hint: str | None = None) -> None:
-        super().__init__(message)
-        self.hint = hint
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,7 +10,7 @@ import re
 from collections.abc import Iterator, Mapping
 from dataclasses import field
 
-from avow.base.diagnostics import Malformed
+from avow.base.diagnostics import Hinted, Malformed
 from avow.base.records import dataclass
 from avow.base.suggestions import did_you_mean, suggest
 
@@ -90,12 +90,8 @@ class Message:
         return "".join((*constants, *(f"{inner.wire} {inner.name}\n" for inner in self.fields)))
 
 
-class NoField(Exception):  # noqa: N818 - it is what was found wrong
+class NoField(Hinted):
     """A path that does not exist in a definition; the text says why."""
-
-    def __init__(self, message: str, hint: str | None = None) -> None:
-        super().__init__(message)
-        self.hint = hint
 
 
 @dataclass(frozen=True, slots=True)

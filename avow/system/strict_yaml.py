@@ -35,12 +35,12 @@ def read_yaml(data: bytes, file: str) -> tuple[Piece, tuple[Diagnostic, ...]]:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         before = data[: error.start].decode("utf-8", errors="replace")
-        line, column = _position(before, len(before))
+        line, column = before.count("\n") + 1, len(before) - before.rfind("\n")
         raise Rejected(_error("not UTF-8 text: save the file as UTF-8", file, line, column)) from None
     try:
         builder = _Builder(file)
         return builder.build(text), tuple(builder.problems)
-    except yaml.YAMLError as error:
+    except (yaml.YAMLError, RecursionError) as error:
         found = yaml_fault(text, error)
         raise Rejected(_error(str(found), file, found.line, found.column, found.hint)) from None
 
@@ -75,13 +75,10 @@ class _Builder:
         self.problems: list[Diagnostic] = []
 
     def build(self, text: str) -> Piece:
-        try:
-            root = yaml.compose(text, _Composer)
-            if root is None:
-                raise Rejected(_error("the file is empty", self.file, 1, 1))
-            return self.piece(root)
-        except RecursionError:
-            raise Rejected(_error("nested too deeply", self.file, 1, 1)) from None
+        root = yaml.compose(text, _Composer)
+        if root is None:
+            raise Rejected(_error("the file is empty", self.file, 1, 1, "write `{}` for a file that sets nothing"))
+        return self.piece(root)
 
     def piece(self, node: yaml.Node) -> Piece:
         if node not in self.made:
@@ -134,11 +131,6 @@ class _Builder:
 
     def reject(self, node: yaml.Node, code: str, message: str) -> Rejected:
         return Rejected(Diagnostic(code, message, self.span(node)))
-
-
-def _position(text: str, offset: int) -> tuple[int, int]:
-    before = text[:offset]
-    return before.count("\n") + 1, offset - (before.rfind("\n") + 1) + 1
 
 
 def _error(message: str, file: str, line: int, column: int, hint: str | None = None) -> Diagnostic:

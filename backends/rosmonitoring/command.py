@@ -25,6 +25,7 @@ from avow.base.codec import document
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.plain import listed
 from avow.base.workspace import named_folder, system_folder
+from avow.evaluation.truth import TOLERANCE
 from avow.ros.bags import digest_trace
 from avow.system.load import PLAN_FILE, load_system
 from avow.system.plan import System
@@ -247,7 +248,8 @@ def _report(
             if output.as_json:
                 shown.append({**violation_json(violation), "line": line})
             else:
-                click.echo(violation.text())
+                text = violation.text()  # the remedy once for a clause
+                click.echo(text if counts[about] == 1 else text.replace(TOLERANCE, ""))
     further = dict(beyond())
     if output.timeline is not None:
         _draw(running, Path(trace), marks, output.timeline)

@@ -9,7 +9,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from avow.base.diagnostics import Rejected
+from avow.base.diagnostics import Hinted, Rejected
 from avow.base.suggestions import nearest, suggest
 from avow.evaluation.evaluate import NotEvaluable, evaluate
 from avow.formulas.values import FunctionValue, Value
@@ -26,13 +26,12 @@ from .rules import NOTHING_KNOWN, Argument, Choice, FieldPath, Fields, Gap, Hold
 from .wires import MappingError, converter, fits, parts_of, whole
 
 
-class Wrong(Exception):  # noqa: N818 - it is what was found wrong
+class Wrong(Hinted):
     """An error in the plan; `path` leads from the variable's entry to its place."""
 
     def __init__(self, message: str, *path: str | int, hint: str | None = None) -> None:
-        super().__init__(message)
+        super().__init__(message, hint)
         self.path = path
-        self.hint = hint
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from fractions import Fraction
 from typing import Any
 
+from avow.base.diagnostics import Hinted
 from avow.base.plain import listed
 from avow.formulas.values import Data, FunctionValue, Value
 from avow.language import sorts as s
@@ -231,12 +232,8 @@ def from_text(cell: str, sort: s.Sort, held: Wire | None = None) -> Value:
     return converter(sort)(cell)
 
 
-class Undecided(Exception):  # noqa: N818 - it is what was found wrong
+class Undecided(Hinted):
     """Several ways to read a variable, or none; the text says which, `hint` what the plan may write."""
-
-    def __init__(self, message: str, hint: str | None = None) -> None:
-        super().__init__(message)
-        self.hint = hint
 
 
 def decide(sort: Sort, message: Message, known: Definitions, values: Mapping[str, str]) -> tuple[FieldPath, ...]:

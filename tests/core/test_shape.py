@@ -45,7 +45,7 @@ ELSEWHERE = {
     "avow/backend_kit/protocol._required": KEPT,
     "avow/backend_kit/registry.every_code": ONCE,
     "avow/backend_kit/registry.installed": ONCE,
-    "avow/base/codes._CATALOGUES": "the codes of the backends that are loaded, which do not change",
+    "avow/base/codes._LOADED": "the codes of the backends that are loaded, which do not change",
     "avow/base/codes.core_codes": ONCE,
     "avow/base/codes.sections": ONCE,
     "avow/base/files._known": ONCE,

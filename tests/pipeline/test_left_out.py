@@ -112,6 +112,14 @@ def test_a_plan_below_a_system_that_does_not_take_it_in_is_left_out(tmp_path: Pa
     ] * told
 
 
+def test_a_next_step_that_closes_several_gates_is_said_once() -> None:
+    gates = (("One", False, "a; next: do it"), ("Two", False, "b; next: do it"), ("Three", False, "c; next: do that"))
+    out = io.StringIO()
+    print_summary([Result("a", 1, {}, "r/a/i.html", (*gates, ("Four", False, "d")))], (), (), 0, 0.1, out)
+    shown = [line.partition("a: ")[2] for line in out.getvalue().splitlines() if line.startswith("✗")]
+    assert shown == ["One: a; next: do it", "Two: b; next: as above", "Three: c; next: do that", "Four: d"]
+
+
 @pytest.mark.parametrize("number", [0, 1, 5])
 def test_a_method_that_ended_with_an_error_is_named_though_every_gate_passes(number: int) -> None:
     """Other evidence may support the claim, such as a recording of an earlier program."""

@@ -203,6 +203,21 @@ def test_inputs_that_are_too_old_are_no_success(tmp_path: Path) -> None:
         assert (done.returncode, "too old (`max_age`)" in done.stdout) == (code, code == 1), done.stdout
 
 
+def test_the_remedy_of_a_clause_is_said_with_its_first_breach(tmp_path: Path) -> None:
+    (tmp_path / "system.rcl").write_text(
+        "node n { inputs() outputs( y : REAL ) topics( std_msgs/Float64 y matches(out.y) ) "
+        "guarantee g ( out.y <= 0.2 ) }"
+    )
+    (tmp_path / "plan.yaml").write_text("ros: {distro: humble}\nnodes: {n: {methods: [{rosmonitoring: {}}]}}\n")
+    events = [{"topic": "y", "time": time, "data": 0.2} for time in (1.0, 2.0, 3.0)]
+    done = monitor(str(tmp_path), "-", stdin="".join(f"{json.dumps(event)}\n" for event in events))
+    assert done.stdout.count("exactly, out.y is 0.2 + 1.1e-17, since no float is the decimal number") >= 3
+    assert done.stdout.count("guarantee broken") >= 3
+    assert done.stdout.partition("event 2")[2].count("event 3") == 1
+    assert "allow a tolerance" in done.stdout.partition("event 2")[0]
+    assert "allow a tolerance" not in done.stdout.partition("event 2")[2].partition("n.g (guarantee)")[0]
+
+
 def test_one_remedy_for_several_clauses_is_said_once(tmp_path: Path) -> None:
     (tmp_path / "system.rcl").write_text(
         "node n { inputs( x : REAL ) outputs( y : BOOL ) topics( std_msgs/Float64 x matches(in.x), std_msgs/Bool y "

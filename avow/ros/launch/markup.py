@@ -50,10 +50,8 @@ def from_yaml(text: str, file: str) -> Parsed:
     """Raises Malformed."""
     try:
         root = yaml.compose(text, Loader=yaml.SafeLoader)
-    except yaml.YAMLError as error:
+    except (yaml.YAMLError, RecursionError) as error:
         raise yaml_fault(text, error) from None
-    except RecursionError:
-        raise Malformed("it is nested too deeply", 1) from None
     entries = root.value if isinstance(root, yaml.MappingNode) else []
     top = next((value for key, value in entries if key.value == "launch"), None)
     if top is None:
