@@ -27,20 +27,9 @@ from avow.system.plan import Edge, Located, System
 from . import observing
 from .pace import NO_TIME, RATE, By, Leeway, Rate, duration
 from .pairing import NUMBER, Answers
-from .parameters import kept, parameter, told
+from .parameters import concerns, constant, kept, parameter
 from .reading import Undecided, from_text, shown
-from .rules import (
-    Choice,
-    Constant,
-    FieldPath,
-    Fields,
-    Parameter,
-    Previous,
-    Rule,
-    of_latest,
-    otherwise,
-    read_from_inputs,
-)
+from .rules import Choice, Constant, FieldPath, Fields, Previous, Rule, of_latest, otherwise, read_from_inputs
 from .traces import carried
 from .tuning import DECIDED_SHARE
 from .wires import MappingError, parts_of, table_of
@@ -85,9 +74,9 @@ class Setup:
         """Whether an event's message is the node's own, for a variable that it carries; None if that is not known. A
         message without a name is taken for the node's own if the contract has no other publisher; so is any that a
         filter guards."""
-        by, rule = publisher(event), self.rules[name]
-        if isinstance(rule, Parameter):
-            return told(event, rule) is not None
+        by, concerned = publisher(event), concerns(self.rules[name], event)
+        if concerned is not None:
+            return concerned
         if name in self.shared:
             return by == self.placed if by in self.shared[name] else None
         guarded = same_topic(self.carried[name].topic) in self.filtered
@@ -131,8 +120,8 @@ class Setup:
     @property
     def heard(self) -> frozenset[str]:
         """The inputs that messages carry, and that may change during a run."""
-        changing = (n for n, rule in self.carried.items() if not (isinstance(rule, Parameter) and rule.constant))
-        return frozenset(name for name in changing if name.startswith(f"{Role.INPUT}."))
+        inputs = ((name, rule) for name, rule in self.carried.items() if name.startswith(f"{Role.INPUT}."))
+        return frozenset(name for name, rule in inputs if not constant(rule))
 
     @property
     def topics(self) -> tuple[str, ...]:
@@ -153,8 +142,8 @@ def setup(
     for port in (*node.inputs, *node.outputs):
         work.port(port)
     work.shared_fields()
-    for name, inputs in read_from_inputs(work.rules, work.mapping()):
-        work.fault(f"it is read from the message that gives {inputs}", name, hint="name what the node publishes")
+    for name, told in read_from_inputs(work.rules, work.mapping()):
+        work.fault(f"it is read from the message that gives {told}", name, hint="name what the node publishes")
     data = observing.data_of(options)
     named, leeway = tuple((_called(system, node, t), t.ros_type) for t in node.topics), work.leeway(data)
     answers = work.answers(data.get("answers"), leeway.jitter)
@@ -351,11 +340,11 @@ class _Work:
         """A link states that both ends have one value: they must be read in the same way."""
         mapped = name in self.mapping()
         for source in observing.sources(self.system, self.node, name.partition(".")[2]) if mapped else ():
-            method = observing.method_of(self.system, source.node)
-            other = _Work(self.system, self.system.contract.node(source.node), method, self.known)
+            node = self.system.contract.node(source.node)
+            other = _Work(self.system, node, observing.method_of(self.system, node.name), self.known)
             if source.node == self.node.name or (entry := other.mapping().get(f"out.{source.port}")) is None:
                 continue
-            other.port(other.node.output(source.port))
+            other.port(node.output(source.port))
             rule_there = other.rules.get(f"out.{source.port}")
             if rule_there is not None and otherwise(rule, rule_there):
                 of = f"{observing.show_entry(entry)} of {getattr(rule_there, 'topic', 'no topic')}"

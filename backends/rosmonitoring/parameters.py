@@ -53,6 +53,16 @@ def kept(system: System, node: Node, rules: dict[str, Rule], known: Definitions)
     return node
 
 
+def constant(rule: Rule) -> bool:
+    """Whether the contract says that a parameter has one value during a run: then it is irrelevant when it is told."""
+    return isinstance(rule, Parameter) and rule.of.parameter
+
+
+def concerns(rule: Rule, event: Event) -> bool | None:
+    """Whether an event tells something of a parameter; None for another variable."""
+    return told(event, rule) is not None if isinstance(rule, Parameter) else None
+
+
 def told(event: Event, rule: Parameter) -> Mapping[str, Any] | None:
     """What an event tells of a parameter; None if it tells nothing of it."""
     node, name = map(str, rule.paths[0][:2])

@@ -103,11 +103,6 @@ class Parameter(Fields):
 
     of: Port = field(kw_only=True)
 
-    @property
-    def constant(self) -> bool:
-        """Whether the contract says that it has one value in a run: when it is told does not matter then."""
-        return self.of.parameter
-
 
 @dataclass(frozen=True, slots=True)
 class Choice:

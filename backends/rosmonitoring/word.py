@@ -21,6 +21,7 @@ from avow.language.terms import Role
 
 from .options import Setup, same_topic
 from .pairing import Answers, Pairing, time_of
+from .parameters import constant
 from .reading import Reader
 from .rules import Previous, of_latest
 from .tuning import KEYS_KEPT
@@ -207,7 +208,7 @@ def topics_of(setup: Setup, names: Iterable[str]) -> dict[str, bool]:
     return {
         same_topic(carried[name].topic): name.startswith(f"{Role.OUTPUT}.")
         for name in sorted(sources)
-        if name in carried
+        if name in carried and not constant(carried[name])
     }
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -73,6 +73,52 @@ def write_bag(
             connection2 = writer2.add_connection(topic, kind, typestore=store)
             for k, fields in enumerate(values, start=1):
                 writer2.write(connection2, start + k * 10**9, store.serialize_cdr(message(fields), kind))
+    return path
+
+
+def write_events(
+    path: Path, kinds: dict[str, str], events: Sequence[dict[str, Any]], definitions: dict[str, str] | None = None
+) -> Path:
+    """A ROS 2 bag of events, as traces of JSON have them. `kinds`: the type of each topic; `definitions`: of types that
+    no distribution has, those of services and actions as messages."""
+    import numpy as np
+    from rosbags.rosbag2 import StoragePlugin, Writer
+    from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+    store = get_typestore(Stores.ROS2_JAZZY)
+    for kind, text in (definitions or {}).items():
+        store.register(get_types_from_msg(text, kind))
+
+    def made(kind: str, data: dict[str, Any]) -> Any:
+        wires = dict(store.get_msgdef(kind).fields)
+        return store.types[kind](**{name: part(wires[name], value) for name, value in data.items()})
+
+    def part(wire: Any, value: Any) -> Any:
+        if isinstance(value, list):
+            inner = wire[1][0]
+            if isinstance(inner[1], str):
+                return [made(inner[1], one) for one in value]
+            word = inner[1][0]
+            return (
+                list(value)
+                if word == "string"
+                else np.array(value, {"octet": "uint8", "char": "uint8"}.get(word, word))
+            )
+        return made(wire[1], value) if isinstance(value, dict) else value
+
+    with Writer(path, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+        known: dict[str, Any] = {}
+        for topic, kind in kinds.items():
+            folder = "action" if "Spin" in kind else "srv"
+            text, _ = store.generate_msgdef(kind, ros_version=2)
+            own = {"msgdef": text, "rihs01": "RIHS01_" + "0" * 64} if kind.endswith("_Event") else {"typestore": store}
+            named = kind.replace("/msg/", f"/{folder}/") if "msgdef" in own else kind
+            known[topic] = writer.add_connection(f"/{topic.lstrip('/')}", named, **own)
+        for event in events:
+            fields = {name: value for name, value in event.items() if name not in ("topic", "time")}
+            kind = kinds[event["topic"]]
+            at = round(event["time"] * 10**9)
+            writer.write(known[event["topic"]], at, bytes(store.serialize_cdr(made(kind, fields), kind)))
     return path
 
 

@@ -25,6 +25,8 @@ from avow.system.graph import dataflow
 from avow.system.load import load_system
 from avow.system.plan import System
 
+from .test_bags import write_events
+
 pytest.importorskip("rosbags")
 
 GO = "float64 speed\n---\nbool ok\nstring in\n"
@@ -488,3 +490,133 @@ def test_rosmonitoring_makes_the_monitor_whose_events_are_judged(ros: str, folde
     (tmp_path / "run.jsonl").write_text("".join(json.dumps(e) + "\n" for e in events), encoding="utf-8")
     running = session(system, ("server",), tmp_path / "run.jsonl")
     assert [(v.clause, v.index) for _, v in running.run(tmp_path / "run.jsonl")] == [("limits", 4)]
+
+
+WORLD = """
+node watch { inputs( speed : REAL, turns : REAL, x : REAL in m ) outputs( ok : BOOL, done : REAL, near : BOOL )
+  topics( my_msgs/Go_Request /go matches(in.speed), my_msgs/Go_Response /go matches(out.ok),
+          my_msgs/Spin_Goal /spin matches(in.turns), my_msgs/Spin_Result /spin matches(out.done),
+          geometry_msgs/PointStamped /seen in map matches(in.x), std_msgs/Bool /near matches(out.near) )
+  guarantee limits ( out.ok <=> in.speed <= 2 )
+  guarantee all_done ( out.done == in.turns )
+  guarantee close ( in.x < 5 -> out.near ) }
+"""
+ANSWERS = "{by: call, others: {latency: 20 ms, jitter: 5 ms, because: measured}}"
+WORLD_PLAN = f"nodes: {{watch: {{mapping: {{in.x: point.x}}, methods: [rosmonitoring: {{answers: {ANSWERS}}}]}}}}\n"
+
+
+def test_a_bag_with_a_service_an_action_and_transforms_is_judged(tmp_path: Path) -> None:
+    """Each of the three has one fault, and is judged as if it were alone."""
+    goal, result, _ = SPIN.split("---\n")
+    request, response = GO.split("---\n")
+    event = EVENT.replace("my_msgs/Go", "my_msgs/{0}")
+    texts = {
+        "Go_Request": request,
+        "Go_Response": response,
+        "Go_Event": EVENT,
+        "Spin_Goal": goal,
+        "Spin_Result": result,
+        "Spin_SendGoal_Request": "unique_identifier_msgs/UUID goal_id\nmy_msgs/Spin_Goal goal\n",
+        "Spin_SendGoal_Response": "bool accepted\nbuiltin_interfaces/Time stamp\n",
+        "Spin_SendGoal_Event": event.format("Spin_SendGoal"),
+        "Spin_GetResult_Request": "unique_identifier_msgs/UUID goal_id\n",
+        "Spin_GetResult_Response": "int8 status\nmy_msgs/Spin_Result result\n",
+        "Spin_GetResult_Event": event.format("Spin_GetResult"),
+    }
+    services = {"/go": "Go", "/spin/_action/send_goal": "Spin_SendGoal", "/spin/_action/get_result": "Spin_GetResult"}
+    kinds = {f"{name}/_service_event": f"my_msgs/msg/{kind}_Event" for name, kind in services.items()}
+    kinds |= {"/tf": "tf2_msgs/msg/TFMessage", "/seen": "geometry_msgs/msg/PointStamped", "/near": "std_msgs/msg/Bool"}
+
+    def called(at: float, name: str, kind: int, number: int, content: dict[str, Any]) -> dict[str, Any]:
+        info = {
+            "event_type": kind,
+            "stamp": {"sec": 1, "nanosec": 0},
+            "client_gid": [0] * 16,
+            "sequence_number": number,
+        }
+        sides = {"request": [content] if kind < 2 else [], "response": [content] if kind > 1 else []}
+        return {"topic": f"{name}/_service_event", "time": at, "info": info, **sides}
+
+    def uuid(number: int) -> dict[str, Any]:
+        return {"goal_id": {"uuid": [number] * 16}}
+
+    def header(at: float, frame: str) -> dict[str, Any]:
+        return {"header": {"stamp": {"sec": int(at), "nanosec": 0}, "frame_id": frame}}
+
+    def moved(at: float, x: float) -> dict[str, Any]:
+        turn = {"rotation": {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}}
+        place = {
+            **header(at, "map"),
+            "child_frame_id": "base",
+            "transform": {"translation": {"x": x, "y": 0.0, "z": 0.0}, **turn},
+        }
+        return {"topic": "/tf", "time": at, "transforms": [place]}
+
+    def seen(at: float, x: float, near: bool) -> list[dict[str, Any]]:
+        point = {"topic": "/seen", "time": at + 0.5, **header(at, "base"), "point": {"x": x, "y": 0.0, "z": 0.0}}
+        return [point, {"topic": "/near", "time": at + 0.53, "data": near}]
+
+    _, sent, got = services
+    said = [moved(0, 0.0), moved(2, 4.0), *seen(1, 1.0, True), *seen(2, 0.5, False), *seen(0, 9.0, False)]
+    said += [called(3.0, "/go", 1, 1, {"speed": 1.0}), called(3.1, "/go", 1, 2, {"speed": 5.0})]
+    said += [called(3.2, "/go", 2, 2, {"ok": True, "in_": ""}), called(3.3, "/go", 2, 1, {"ok": True, "in_": ""})]
+    for number, turns, done in ((1, 2.0, 2.0), (2, 5.0, 4.0)):
+        said += [called(4.0 + number, sent, 1, number, {**uuid(number), "goal": {"turns": turns}})]
+        said += [called(4.1 + number, got, 1, number, uuid(number))]
+        said += [called(4.2 + number, got, 2, number, {"status": 4, "result": {"done": done}})]
+    said = sorted(said, key=lambda one: one["time"])
+    bag = write_events(tmp_path / "run", kinds, said, {f"my_msgs/msg/{name}": text for name, text in texts.items()})
+    (tmp_path / "my_msgs/action").mkdir(parents=True)
+    (tmp_path / "my_msgs/action/Spin.action").write_text(SPIN, encoding="utf-8")
+    system = make(tmp_path, f"messages: [my_msgs]\nros: {{distro: jazzy}}\n{WORLD_PLAN}", WORLD)
+    running = session(system, (), bag)
+    found = [(v.clause, v.time) for _, v in running.run(bag)]
+    assert found == [("close", "2.53"), ("limits", "3.2"), ("all_done", "6.2")]
+    tallies = {name: tally for _, name, _, tally in running.clauses()}
+    assert {name: (t.judged, t.broken) for name, t in tallies.items()} == {
+        "limits": (2, 1),
+        "all_done": (2, 1),
+        "close": (3, 1),
+    }
+
+
+STATES = """
+context {
+  Goal : {accepted, executing, canceling, succeeded, canceled, aborted};
+  State : {unconfigured, inactive, active, finalized};
+}
+node mover { inputs( clear : BOOL, state : State ) outputs( goal : Goal )
+  topics( bool clear matches(in.clear), lifecycle_msgs/TransitionEvent mover/transition_event matches(in.state),
+          action_msgs/GoalStatusArray spin/_action/status matches(out.goal) )
+  guarantee safe ( in.state == active -> (out.goal == executing -> in.clear) )
+  guarantee ends ( rose(out.goal == executing) -> within[2 s](out.goal in {succeeded, canceled, aborted}) ) }
+"""
+
+
+def test_states_of_goals_and_of_lifecycle_nodes_are_enumerations(tmp_path: Path) -> None:
+    words = ("accepted", "executing", "canceling", "succeeded", "canceled", "aborted")
+    status = {"field": "status_list[-1].status", "values": {f"STATUS_{word.upper()}": word for word in words}}
+    method = {"answers": {"by": "arrival", "because": "one process writes the trace"}}
+    mapping = {"in.state": "goal_state.label", "out.goal": status}
+    plan = {
+        "ros": {"distro": "humble"},
+        "nodes": {"mover": {"mapping": mapping, "methods": [{"rosmonitoring": method}]}},
+    }
+
+    def turned(at: float, label: str) -> dict[str, Any]:
+        return {"topic": "/mover/transition_event", "time": at, "goal_state": {"id": 0, "label": label}}
+
+    def goals(at: float, *states: str) -> dict[str, Any]:
+        return {
+            "topic": "/spin/_action/status",
+            "time": at,
+            "status_list": [{"status": words.index(s) + 1} for s in states],
+        }
+
+    events = [{"topic": "clear", "time": 0, "data": False}, turned(0.1, "inactive")]
+    events += [goals(1, "executing"), goals(2, "succeeded"), turned(3, "active"), goals(4, "succeeded", "executing")]
+    events += [{"topic": "clear", "time": 4.5, "data": True}, goals(7, "succeeded", "aborted")]
+    system = make(tmp_path, json.dumps(plan), STATES)
+    (tmp_path / "t.jsonl").write_text("".join(json.dumps(event) + "\n" for event in events), encoding="utf-8")
+    found = [(v.clause, v.time) for _, v in session(system).run(tmp_path / "t.jsonl")]
+    assert found == [("safe", "4"), ("ends", "6")]

@@ -22,6 +22,7 @@ from avow.base.verdict import Verdict
 from avow.system.plan import System
 
 from .conftest import job_for, one_by_one
+from .test_bags import write_events
 from .test_dds import Listening, needs_dds, peer  # noqa: F401 - a fixture
 
 RCL = """
@@ -158,47 +159,52 @@ def test_a_constant_parameter_needs_no_pairing(
     assert "limit" not in str(running.unmonitored())
 
 
-def write_bag(path: Path, events: Sequence[dict[str, Any]]) -> Path:
-    from rosbags.rosbag2 import StoragePlugin, Writer
-    from rosbags.typesys import Stores, get_typestore
+STAMPED = """
+node n {
+  inputs( v : REAL, parameter limit : REAL )
+  outputs( o : REAL )
+  topics( geometry_msgs/PointStamped /v matches(in.v), geometry_msgs/PointStamped /o matches(out.o) )
+  guarantee near ( in.v < limit -> out.o > 0 )
+  guarantee soon ( rose(in.v < limit) -> next(out.o > 0) )
+}
+"""
 
-    store = get_typestore(Stores.ROS2_HUMBLE)
-    kinds = {
-        "/parameter_events": "rcl_interfaces/msg/ParameterEvent",
-        "v": "std_msgs/msg/Float64",
-        "o": "std_msgs/msg/Bool",
-    }
 
-    def made(kind: str, data: Any) -> Any:
-        if not isinstance(data, dict):
-            return data
-        types = dict(store.get_msgdef(kind).fields)
-        return store.types[kind](**{name: part(types[name], value) for name, value in data.items()})
+@pytest.mark.parametrize("given", [True, False])
+def test_steps_by_stamp_do_not_wait_for_a_constant_parameter(
+    make_system: Callable[..., System], tmp_path: Path, given: bool
+) -> None:
+    method = {"answers": {"by": "stamp"}, "mapping": {"in.v": "point.x", "out.o": "point.x"}}
+    entry = {"methods": [{"rosmonitoring": method}], **({"parameters": {"limit": 1.0}} if given else {})}
+    system = make_system(STAMPED, plan={**PLAN, "nodes": {"n": entry}})
+    events = [told(0, {"limit": 1.0})]
+    for k, (v, o) in enumerate([(2.0, -1.0), (0.5, 1.0), (0.4, 1.0), (3.0, -1.0), (0.5, 1.0), (0.5, -1.0)], 1):
+        for topic, at, x in (("v", k, v), ("o", k + 0.1, o)):
+            header = {"stamp": {"sec": k, "nanosec": 0}, "frame_id": ""}
+            events.append({"topic": topic, "time": at, "header": header, "point": {"x": x, "y": 0, "z": 0}})
+    assert judged(system, events, tmp_path)[1] == [("near", "GUARANTEE"), ("soon", "GUARANTEE")]
+    changed = [*events[:-2], told(5.5, {"limit": 0.9}, "changed"), *events[-2:]]
+    running, found = judged(system, changed, tmp_path)
+    name = "limit_value" if given else "limit_constant"
+    assert found == [(name, "ASSUMPTION"), ("near", "EXCUSED"), ("soon", "EXCUSED")]
+    assert not running.unmonitored()
 
-    def part(wire: Any, value: Any) -> Any:
-        import numpy as np
 
-        if isinstance(value, list):
-            return [made(wire[1][0][1], one) for one in value] if wire[1][0][0].name == "NAME" else np.array(value)
-        return made(wire[1], value) if isinstance(value, dict) else value
-
-    with Writer(path, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
-        known = {t: writer.add_connection(f"/{t.lstrip('/')}", kind, typestore=store) for t, kind in kinds.items()}
-        for event in events:
-            fields = {name: value for name, value in event.items() if name not in ("topic", "time")}
-            topic, at = event["topic"], round(event["time"] * 10**9)
-            writer.write(known[topic], at, store.serialize_cdr(made(kinds[topic], fields), kinds[topic]))
-    return path
+KINDS = {
+    "/parameter_events": "rcl_interfaces/msg/ParameterEvent",
+    "v": "std_msgs/msg/Float64",
+    "o": "std_msgs/msg/Bool",
+}
 
 
 def test_a_bag_has_them_and_is_evidence(make_system: Callable[..., System]) -> None:
     system = make_system(RCL, plan={**PLAN, "ros": {"nodes": PLAN["ros"]["nodes"]}}, traces=["bag"])  # type: ignore[index]
     steps = [event for k in range(30) for event in said(1 + k, 0.05 + k % 2, k % 2 == 0)]
-    write_bag(system.plan.root / "bag", [told(0, GIVEN), *steps])
+    write_events(system.plan.root / "bag", KINDS, [told(0, GIVEN), *steps])
     job = job_for(system, "n")
     report = discharge(job, {"bag": ""}, Limits())
-    assert [o.verdict for o in report.outcomes] == [Verdict.MONITORED, Verdict.MONITORED]
-    write_bag(system.plan.root / "bag2", [told(0, GIVEN), *steps, told(40, {"limit": 0.3}, "changed")])
+    assert [o.verdict for o in report.outcomes] == [Verdict.MONITORED, Verdict.MONITORED], report.outcomes
+    write_events(system.plan.root / "bag2", KINDS, [told(0, GIVEN), *steps, told(40, {"limit": 0.3}, "changed")])
     broken = of_job(job, "bag2", system.plan.root / "bag2", float("inf"))
     assert broken
 
