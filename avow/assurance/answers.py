@@ -370,7 +370,10 @@ class Answers:
     statement: str
     """The statement that a signer makes."""
     warned: str = field(default="", metadata=LATER)
-    """``13 findings against it, which the plan lists``, beside the verdict; empty if nothing is known to be bad."""
+    """``13 findings against it, which the plan lists: 11 refuted, 2 vacuous``, beside the verdict; empty if nothing is
+    known to be bad."""
+    unrated: str = field(default="", metadata=LATER)
+    """Why no failure rate is known, beside a verdict that rests on samples."""
     owners: str = field(default="", metadata=LATER)
     """The owners of the assumptions, and the day on which the first one ends; empty if there are none."""
     weakened_by: str = field(default="", metadata=LATER)
@@ -392,7 +395,7 @@ class Answers:
     @property
     def beside(self) -> str:
         """The text beside the verdict in every format."""
-        return " · ".join(part for part in (self.warned, self.counts, self.weakened, self.gates) if part)
+        return " · ".join(part for part in (self.warned, self.unrated, self.counts, self.weakened, self.gates) if part)
 
     @property
     def told(self) -> str:

@@ -115,9 +115,11 @@ def answers(
         verdict = f"{verdict}; {count(unrun, 'claim')} about programs not run"
         tone = min(tone, Tone.AMBER, key=_rank)
     warned = ""
-    bad = sum(bool(view.handled) and not view.standing.supports for view in views)
-    if bad and passed:  # whatever else holds: with a known-bad finding the case is not green
-        warned = f"{count(bad, 'finding')} against it, which the plan lists"
+    known = [view for view in views if view.handled and not view.standing.supports]
+    if known and passed:  # whatever else holds: with a known-bad finding the case is not green
+        of = Counter("remarked" if view.advice else view.standing.value for view in known)
+        told = ", ".join(f"{many} {status}" for status, many in of.items())
+        warned = f"{count(len(known), 'finding')} against it, which the plan lists: {told}"
         tone = Tone.RED if strict else min(tone, Tone.AMBER, key=_rank)
     by_level = tuple((level, number[level]) for level in _WORST_FIRST if number[level])
     asked = [gate for gate in gates if not gate.idle]
@@ -140,7 +142,7 @@ def answers(
         counts=" · ".join(f"{many} {level}" for level, many in by_level) or "no requirement",
         weakened=of_deficits(kinds) if kinds else "no deficit",
         gates=f"policy: {good} of {count(len(asked), 'gate')} pass" + "es" * (len(asked) == 1) + idle,
-        listed=_listed(requirements),
+        listed=_listed(requirements, relied),
         based_on=tuple(basis[:NODES]),
         bases=tuple(sorted(basis, key=lambda b: b.node)),
         more_nodes=f"and {count(len(basis) - NODES, 'node')} on no less" if len(basis) > NODES else "",
@@ -151,12 +153,7 @@ def answers(
             else ""
         ),
         refuted=_refuted(requirements, views, nodes),
-        unneeded=(
-            f"{count(unneeded, 'guarantee')} that no requirement or hazard needs "
-            f"{'is' if unneeded == 1 else 'are'} left out of this comparison"
-            if unneeded
-            else ""
-        ),
+        unneeded=f"{count(unneeded, 'guarantee')} needed by no requirement or hazard: not compared" if unneeded else "",
         supposed=tuple(_lines(assumptions)),
         owned=f"{owned} of {len(assumptions)}" if assumptions else "",
         changed_against="",
@@ -164,6 +161,7 @@ def answers(
         signed="not signed",
         statement=_statement(f"{verdict} ({warned})" if warned else verdict, assumptions, kinds),
         warned=warned,
+        unrated=_rate(requirements, headline)[1] if headline.holds else "",
         owners=_owners(assumptions),
         weakened_by=briefly(deficits),
         trusted=trusted,
@@ -201,23 +199,31 @@ def _verdict(
         return Level.NOT_SHOWN, said(Level.NOT_SHOWN, f"{len(missing)} {of_all} not validated"), Tone.AMBER
     level = Level.lowest(r.level for r in requirements) or Level.NOT_SHOWN
     tone = min((r.tone for r in requirements), key=_rank)
+    brief, _ = _rate(requirements, level)
+    return level, said(level) + (f" ({brief})" if brief else ""), tone
+
+
+def _rate(requirements: Sequence[RequirementView], level: Level) -> tuple[str, str]:
+    """The least favourable failure rate, and why none is known; empty if nothing is sampled."""
     rates = [r.rate for r in requirements if r.rate is not None]
     worst = max(rates, key=lambda rate: Fraction(rate.bound or 1), default=None)
-    brief = (
-        worst.brief if worst and level in (Level.TESTS, Level.TESTED_MODELS) else NO_RATE
-    )  # of what is argued, no sample gives a rate
-    return level, said(level) + (f" ({brief})" if worst else ""), tone
+    if worst and level not in (Level.TESTS, Level.TESTED_MODELS):
+        return NO_RATE, "no sample gives a rate of what a person argues"
+    return (worst.brief, worst.lacks) if worst else ("", "")
 
 
-def _badness(view: RequirementView) -> tuple[int, int, int]:
-    """Sorts the worst requirement first: colour, level, number of assumptions."""
-    return view.tone.rank, _WORST_FIRST.index(view.level), -len(view.supposes)
-
-
-def _listed(requirements: Sequence[RequirementView]) -> tuple[str, ...]:
+def _listed(requirements: Sequence[RequirementView], relied: Mapping[str, Relied]) -> tuple[str, ...]:
+    """The requirements with a row each: if there are too many, the worst by colour, level, weakest evidence and number
+    of assumptions."""
     if len(requirements) <= ROWS:
         return tuple(r.id for r in requirements)
-    return tuple(r.id for r in sorted(requirements, key=_badness)[:WORST])
+
+    def badness(view: RequirementView) -> tuple[object, ...]:
+        found = relied.get(view.weakest_evidence.claim) if view.weakest_evidence else None
+        evidence = weakness(found) if found else (-1,)
+        return view.tone.rank, _WORST_FIRST.index(view.level), evidence, -len(view.supposes)
+
+    return tuple(r.id for r in sorted(requirements, key=badness)[:WORST])
 
 
 def _basis(

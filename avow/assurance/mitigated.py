@@ -8,7 +8,7 @@ from dataclasses import replace
 from avow.assurance.answers import Assumption, Level, Tone
 from avow.assurance.closure import Closure
 from avow.assurance.first_screen import tone_of, weakest_of
-from avow.assurance.hazards import HazardView, Mitigation
+from avow.assurance.hazards import WORST_FIRST, HazardView, Mitigation
 from avow.assurance.model import NodeView, ObligationView, RequirementView
 from avow.assurance.naming import requirement_claim
 from avow.assurance.relied import Opinion, Relied, relied_upon, weakness
@@ -27,8 +27,9 @@ def hazard_views(
     nodes: Sequence[NodeView],
     opinion: Opinion,
 ) -> tuple[HazardView, ...]:
-    """The hazards in their order. Guarantees as mitigations are judged like a requirement that rests on them, with
-    everything that they rest on and assume; `relied`: claim → the record that it relies on."""
+    """The hazards, the least mitigated first: by level, then by the weakest evidence. Guarantees as mitigations are
+    judged like a requirement that rests on them, with everything that they rest on and assume; `relied`: claim → the
+    record that it relies on."""
     known = {r.id: r for r in requirements}
     titles = {node.name: node.title for node in nodes}
     clauses = {f"{node.name}.{clause}" for node in nodes for clause, _ in node.guarantees}
@@ -73,7 +74,7 @@ def hazard_views(
         bounded = is_bounded(closed.claims, taken) or any(taken[name] != relied[name] for name in own)
         return level, tone_of(level, mine, bounded=bounded)
 
-    found = []
+    found: list[tuple[tuple[object, ...], HazardView]] = []
     for hazard in hazards:
         items = list(map(mitigation, hazard.mitigated_by))
         level = Level.lowest(m.level for m, _, _ in items) or Level.NOT_SHOWN
@@ -83,13 +84,16 @@ def hazard_views(
         taken: dict[str, Relied] = {}  # of a claim that several methods are named for, the weaker record
         for name, one in (pair for _, _, by in items for pair in by.items()):
             taken[name] = min(one, taken.get(name, one), key=weakness)
-        weakest = weakest_of(below.claims, views, {**relied, **taken}, titles)
+        by_claim = {**relied, **taken}
+        weakest = weakest_of(below.claims, views, by_claim, titles)
+        order = weakness(by_claim[weakest.claim]) if weakest else ()
         if not level.holds:
             claims = [claim for m, _, _ in items for claim in m.claims]
             weakest = failing_of(claims, below.failing, views, titles)
         named = tuple(m for m, _, _ in items)
-        found.append(HazardView(hazard, named, level, tone, below.claims, below.failing, weakest))
-    return tuple(found)
+        view = HazardView(hazard, named, level, tone, below.claims, below.failing, weakest)
+        found.append(((WORST_FIRST.index(level), order if level.holds else ()), view))
+    return tuple(view for _, view in sorted(found, key=lambda pair: pair[0]))
 
 
 def _of_method(view: ObligationView, method: str, opinion: Opinion) -> Relied | None:

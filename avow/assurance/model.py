@@ -259,7 +259,7 @@ class RequirementView:
     too_often: str = field(default="", metadata=codec.LATER)
     """The reason why its samples do not show the probability that is asked; empty if they do, or none is asked."""
     searched: str = field(default="", metadata=codec.LATER)
-    """How far its own formula or property was searched, if not exhaustively."""
+    """What bounds it, and how far that was searched; empty if nothing does."""
     span: Span | None = None
     validation: Validation | None = None
     validated: bool = False
@@ -287,9 +287,8 @@ class RequirementView:
     @property
     def noted(self) -> str:
         """The text beside its level: how often it may fail, how far it was searched, why it is not green."""
-        why = "within bounds" if self.bounded else "an assumption has no owner or end"
-        amber = self.bounded or (self.level is Level.SHOWN and self.tone is Tone.AMBER)
-        parts = (self.rate.brief if self.rate and self.rate.bound else "", self.searched or why * amber)
+        why = "an assumption has no owner or end" * (self.level is Level.SHOWN and self.tone is Tone.AMBER)
+        parts = (self.rate.brief if self.rate and self.rate.bound else "", self.searched or why)
         return "; ".join(part for part in parts if part) if self.level.holds else ""
 
     @property

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from avow.assurance.naming import short
 from avow.base.codec import LATER, Unreadable, from_json
 from avow.base.percent import at_least, at_most, percent
-from avow.base.plain import count, decimal, listed
+from avow.base.plain import decimal, listed
 from avow.base.records import dataclass
 from avow.base.verdict import Verdict
 from avow.evidence.record import COMPOSES, LIKELY, LIKELY_LEAVES, RATE, Evidence
@@ -64,12 +64,15 @@ class RateView:
         return f"at most {at_most(self.bound)} of {self.trial}s fail{sure}"
 
     @property
+    def lacks(self) -> str:
+        """Why there is no rate below 100 %; empty if there is one."""
+        return self.why or "the sampled claims together show no bound" * (self.brief == NO_RATE)
+
+    @property
     def words(self) -> str:
         """One line, without a full stop."""
-        if not self.bound:
-            return f"failure rate of the requirement unknown, as {self.why}"
-        if Fraction(self.bound) >= 1:
-            return f"{NO_RATE}: {count(len(self.leaves), 'sampled claim')} together show no bound below 100 %"
+        if self.lacks:
+            return f"{NO_RATE}, as {self.lacks}"
         if len(self.leaves) < 2:
             return f"failure rate: {self.brief} ({_TRIALS[self.trial]})"
         how = f"union bound over {len(self.leaves)} sampled claims, joint confidence by Bonferroni"
@@ -105,8 +108,8 @@ def rate_of(own: Iterable[str], claims: Iterable[str], views: Mapping[str, Oblig
     proof = next((found for name in own for record in views[name].records if (found := _composes(record))), None)
     why = ""
     if unrated:
-        names = listed([short(name) for name in unrated], 3)
-        why = f"only experiments count trials of the robot's use, and none counts for {names}"
+        others = ", among others" * (len(unrated) > 1)
+        why = f"no experiment counts trials of the robot's use for {short(unrated[0])}{others}"
     elif proof is None:
         why = "no proof of a formula composes one from the samples"
     elif beyond := [short(leaf.claim) for leaf in leaves if short(leaf.claim) in proof.beyond]:

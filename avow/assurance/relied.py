@@ -223,8 +223,13 @@ def seen(relied: Relied) -> str:
             return "proved from the nodes' contracts and what is assumed"
         case Status.PROVED:
             return "proved for all inputs that the contract allows"
+        case Status.CHECKED if relied.record.method == "compose" and isinstance(bound.get("steps"), int):
+            many = count(bound["steps"], "kind of steps", "kinds of steps")
+            return f"every run within the plan's scenario was looked at, with {many}"
         case Status.CHECKED:
-            return "every case of a bounded model was looked at"
+            states = bound.get("states")
+            many = f", with {count(states, 'state')}" if isinstance(states, int) else ""
+            return f"every case of a bounded model was looked at{many}"
         case Status.TESTED if isinstance(bound.get("runs"), int):
             failures = bound.get("failures", 0)
             runs, triggered = count(bound["runs"], "run"), bound.get("triggered", bound["runs"])

@@ -11,7 +11,7 @@ from avow.assurance.first_screen import tone_of, weakest_of
 from avow.assurance.model import ObligationView, RequirementView
 from avow.assurance.naming import requirement_claim, short
 from avow.assurance.rates import rate_of, short_of
-from avow.assurance.relied import Relied, looked_at, seen
+from avow.assurance.relied import Relied, looked_at, seen, weakness
 from avow.assurance.summary import worst_first
 from avow.assurance.support import Names, requirement_support
 from avow.base.plain import count, listed
@@ -87,7 +87,7 @@ def held(
         supposes=tuple(s.key for s in mine),
         rate=rate,
         too_often=too_often,
-        searched=next((seen(r) for n in view.obligations if (r := relied.get(n)) and r.status is Status.TESTED), ""),
+        searched=_searched(view.obligations, closed.claims, relied),
         answer=_with_level(view, level, too_often or (rate.words if rate else ""), weakest, len(mine), awaits=awaits),
     )
 
@@ -113,6 +113,18 @@ def _with_level(
         f"{rate[0].upper()}{rate[1:]}." if rate else "",
     ]
     return " ".join(part for part in parts if part)
+
+
+def _searched(own: Sequence[str], claims: Iterable[str], relied: Mapping[str, Relied]) -> str:
+    """What bounds a requirement, and how far that was searched: its own formula, else the weakest claim below it."""
+    short_of = [name for name in own if name in relied and relied[name].status is not Status.PROVED]
+    if short_of:
+        return seen(relied[short_of[0]])
+    bounded = [name for name in claims if name in relied and relied[name].bounded]
+    name = min(bounded, key=lambda n: (*weakness(relied[n]), n), default="")
+    if not name or relied[name].status is Status.PROVED:
+        return f"within the bounds that {'it' if name in own else short(name)} assumes" if name else ""
+    return f"within the bounds of {short(name)}, {seen(relied[name])}"
 
 
 def is_bounded(claims: Iterable[str], relied: Mapping[str, Relied]) -> bool:

@@ -54,7 +54,7 @@ def trust_lines(
     if tools:
         (tool, many), *others = sorted(tools.items(), key=lambda found: (-found[1], found[0]))
         told = [f"{count(many, 'answer')} of {tool}", *(f"{many} of {tool}" for tool, many in others)]
-        if rest := others[_TOOLS - 1 :]:
+        if len(rest := others[_TOOLS - 1 :]) > 1:
             told[_TOOLS:] = [f"{sum(many for _, many in rest)} of {count(len(rest), 'other tool')}"]
         shown = sum(v.obligation.kind is Kind.GUARANTEE and v.status.supports for v in views)
         again = f"{shown - single} of {count(shown, 'guarantee that holds has', 'guarantees that hold have')} "

@@ -39,6 +39,8 @@ class Facts:
         self.changes: list[Json] = list(map(_flat, case["changes"]["entries"]))
         self.gates = [g for g in case["gates"] if not g.get("idle")]
         self.failing = [g for g in case["gates"] if not g["passed"]]
+        self.advice = {item["claim"] for item in case["open_items"] if item["kind"] == "advice"}
+        self.advice |= {_id(v) for v in self.views if v["obligation"].get("advisory")}
         self.quoted = {" ".join(text.split()) for text in self._texts()}
 
     def _texts(self) -> Iterator[str]:
@@ -52,6 +54,7 @@ class Facts:
                 v["obligation"]["claim"].rstrip("."),
                 v["obligation"]["name"],
                 _id(v),
+                _short(v),
             )
             yield from (r["numbers"] for r in records(v))
             for told in (_refuting(record, v["obligation"]["formula"]) for record in records(v)):
@@ -81,17 +84,17 @@ class Facts:
         return [int(a["number"][1:]) for a in self.assumptions if a["sort"] == sort]
 
     def wrong(self) -> list[Json]:
-        advice = {item["claim"] for item in self.case["open_items"] if item["kind"] == "advice"}
-        bad = [v for v in self.views if v["status"] in ("refuted", "contradictory")]
-        return [v for v in bad if not v["obligation"].get("advisory") and _id(v) not in advice]
+        return [v for v in self.views if v["status"] in ("refuted", "contradictory") and _id(v) not in self.advice]
 
     def wronged(self) -> int:
         """Nodes with a refuted claim, the whole system among them."""
         return len({v["obligation"]["node"] for v in self.wrong()})
 
-    def known(self) -> int:
-        """Findings that the plan speaks of and that support nothing."""
-        return sum(bool(v["handled"]) and v["standing"] not in (*SUPPORTS, "argued") for v in self.views)
+    def known(self) -> tuple[str, str]:
+        """Findings that the plan speaks of and that support nothing, and how many stand how; remarks apart."""
+        bad = [v for v in self.views if v["handled"] and v["standing"] not in (*SUPPORTS, "argued")]
+        of = Counter("remarked" if _id(v) in self.advice else v["standing"] for v in bad)
+        return str(len(bad)), ", ".join(f"{many} {status}" for status, many in of.items())
 
     def unneeded(self) -> int:
         """Guarantees beneath no requirement and no hazard; none where no requirement is named."""
@@ -119,12 +122,10 @@ class Facts:
 
     def tools(self) -> Counter[str]:
         """How many answers without a certificate each tool has: proofs, searches, tests, observations, refutations."""
-        found = Counter(tool for p in self.case["proofs"] for tool in p.get("tools") or ())
-        sampled = ("checked", "tested", "monitored")
-        found.update(
-            _tool(r) for v in self.views for r in records(v) if support(r) in sampled or r["verdict"] == "refuted"
-        )
-        return found
+        told = [r for v in self.views for r in records(v)]
+        told = [r for r in told if support(r) in ("checked", *_SAMPLED) or r["verdict"] == "refuted"]
+        proofs = Counter(tool for p in self.case["proofs"] for tool in p.get("tools") or ())
+        return proofs + Counter(map(_tool, told))
 
     def stands(self, node: str, status: str, what: str) -> tuple[int, int]:
         """At least and at most so many guarantees of a node stand so, by evidence of such an object (any: ``-``)."""
@@ -194,8 +195,8 @@ class Facts:
         return {words for v in found for r in supporting(v) for words in _seen(r)}
 
     def searched(self, requirement: str) -> set[str]:
-        """The same of a requirement's own formula or property."""
-        own = {name for r in self.requirements if r["id"] == requirement for name in r["obligations"]}
+        """The same of a requirement's own formula or property, and of the claims below it, with their names."""
+        own = {n for r in self.requirements if r["id"] == requirement for n in (*r["obligations"], *r["closure"])}
         return {words for v in self.views if _id(v) in own for r in supporting(v) for words in _seen(r)}
 
     def fails(self, claims: list[str]) -> list[str]:
@@ -357,6 +358,11 @@ def _seen(record: Json) -> Iterator[str]:
             else _count(cases, "case")
         )
         yield f"{met}, none failed{most}"
+    if support(record) == "checked":
+        steps, states = (bound.get(key) for key in ("steps", "states"))
+        yield f"every case of a bounded model was looked at, with {_count(states, 'state')}"
+        many = f"{steps} kind{'' if steps == 1 else 's'} of steps"
+        yield f"every run within the plan's scenario was looked at, with {many}"
     if isinstance(bound.get("depth"), int):
         yield f"searched to step {bound['depth']}, not exhaustively"
     if isinstance(bound.get("judged"), int):

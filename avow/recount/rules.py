@@ -338,6 +338,7 @@ _BOUND = r"(?:, with no bound on failures| \([^()]*: at most [\d.]+ %(?: of (?:c
 _SEEN = r"[Oo]bserved \d+ times?(?: on \d+ recorded runs?)?, none against it"
 _SEEN += rf"|(?:[Oo]nly )?\d+ of \d+ cases? met its condition, none failed{_BOUND}|\d+ cases?, none failed{_BOUND}"
 _SEEN += r"|searched to step \d+, not exhaustively"
+_SEEN += r"|[Ee]very (?:case|run) [^;,␟]* was looked at, with \d+ (?:states?|kinds? of steps)"
 _SEEN += rf"|\d+ (?:triggered )?runs?(?: of \d+)?, \d+ failed(?:; the worst stratum: [^()]*[^() ])?{_BOUND}"
 
 _WHY = r"fails\. (.*?)(?:; and (\d+) more)?(?=\.? Next:|\.? $)"
@@ -355,7 +356,9 @@ RULES = (
     _rule("", r"Not shown: (\d+) of (\d+) requirements?", lambda f, _m, _b: (str(f.lost()), str(len(f.requirements)))),
     _rule("", r"Not shown: (\d+) gates? fails?", _whole(lambda f: len(f.failing))),
     _rule("", r"(\d+) claims? about programs not run", lambda f, _m, _b: (str((f.deficit("programs") or (0, 0))[1]),)),
-    _rule("", r"(\d+) findings? against it, which the plan lists", _whole(Facts.known)),
+    _rule(
+        "", r"(\d+) findings? against it, which the plan lists: ([\w, -]*\w)", lambda f, _m, _b: f.known()
+    ),
     _rule("", r"(\d+) kinds? of assurance deficit", _whole(_kinds)),
     _rule("head", r"Refuted: ([^␟]*?)(?: and (\d+) more)?(?=; | $| · |[ ,] ?\d)", _listed),
     _rule("head", r"; since then: ([^␟]*?)(?: and (\d+) more)?(?= ␟| $)", _since),
@@ -376,7 +379,7 @@ RULES = (
     _rule("q2", r"and (\d+) nodes? on no less", _whole(lambda f: len(f.case["nodes"]) - 8)),
     _rule("q3", r"and (\d+) more claims?", _whole(lambda f: len(f.wrong()) - min(3, f.wronged()))),
     _rule("q3", r"(\d+) in all", _whole(lambda f: len(f.wrong()))),
-    _rule("q3", r"(\d+) guarantees? that no requirement or hazard needs", _whole(Facts.unneeded)),
+    _rule("q3", r"(\d+) guarantees? needed by no requirement or hazard", _whole(Facts.unneeded)),
     _rule("q3", r"(?:Refuted: |; )[^“”]*: “([^”]*\d[^”]*)” \(", _felled),
     _rule("q3", r"On it rests? ([^␟;]*?)(?: and (\d+) more)?(?=\.? $|;)", _listed),
     _rule("q3", r"Requirements (?:refuted|not shown): ([^␟]*?)(?: and (\d+) more)?(?=\. )", _listed),
@@ -395,7 +398,7 @@ RULES = (
     _rule("q5", r" all (\d+)(?= $)", _whole(lambda f: len(f.changes))),
     _rule("q5", r"^ (\d+) more(?:, (\d+) of them better)? $", _rest),
     _rule("q5", r"re-run: (\d+) guarantees?, same answer", _whole(lambda f: f.case["changes"]["again"])),
-    _rule("q6", rf"(\d+) ({'|'.join(_DEFICITS)})(?= $|, up to)", _deficit),
+    _rule("q6", rf"(\d+) ({'|'.join(_DEFICITS)})(?= $|; |, up to)", _deficit),
     _rule("deficits", rf"(\d+) ␟ ({'|'.join(_DEFICITS)})(?= ␟|, up to)", _deficit),
     _rule("", r", up to (\d+) % of them", _whole(Facts.unanswered)),
     _rule(

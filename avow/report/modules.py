@@ -14,6 +14,7 @@ from avow.assurance.naming import derivation_claim
 from avow.base.plain import count, listed
 from avow.base.records import dataclass
 from avow.evidence.obligation import Kind
+from avow.evidence.status import Status
 from avow.report.wording import tally
 
 
@@ -102,10 +103,11 @@ def _because(case: Case, r: RequirementView) -> str:
         case Level.REFUTED:
             return "Refuted: the contracts allow a counterexample."
         case _:  # every other level is derived, or sampled by a search
-            within = ", within finite bounds that the evidence names" if r.bounded else ""
             every = not r.supported_by and {view.id for view in case.guarantees} <= set(r.rests_on)
             named = " The plan names no guarantee below it: it counts as resting on all of them." if every else ""
-            how = f"Nothing refutes it: {r.searched}" if r.searched else f"A tool derived it{within}"
+            tested = any(case.obligation(name).status is Status.TESTED for name in r.obligations)
+            how = "Nothing refutes it" if tested else "A tool derived it"
+            how += f": {r.searched}" if r.searched else ""
             return f"{str(r.level).capitalize()}: {MEANINGS[r.level]}. {how}.{named}"
 
 

@@ -24,6 +24,7 @@ from avow.report import example
 from avow.report.answers_page import full_reason
 from avow.report.modules import RequirementModule, requirement_modules
 from avow.report.page import by_node
+from avow.report.short import weakest_words
 from avow.report.source import plain_lines
 from avow.report.wording import (
     NO_HAZARD,
@@ -125,20 +126,11 @@ def _first(case: Case) -> dict[str, Any]:
         "hazards": "; ".join(f"{tone.mark} mitigation {level}: {names}" for tone, level, names in dangers(case)),
         "by_level": levels if many else [],
         "listed": rows,
-        "weakest": a.refuted or _weakest(case),
+        "weakest": weakest_words(case),
         "deficits": [f"{w.count} {w.words}" for w in case.deficits] or ["No deficit is known."],
         "supposed": [(line.about, f"{line.number} {line.says}", line.more) for line in a.supposed],
         "content": f"What is signed has the digest {baseline_of(case).content[:16]}…",
     }
-
-
-def _weakest(case: Case) -> str:
-    found = case.answers.weakest
-    if found is None:
-        return "There is no evidence."
-    rests = f" On it rest {listed(found.needed_by)}." if found.needed_by else ""
-    left_out = f" {case.answers.unneeded}." if case.answers.unneeded else ""
-    return f"{found.title}: “{found.quote}”. {found.words[:1].upper()}{found.words[1:]}.{rests}{left_out}"
 
 
 def _toned(requirement: RequirementView) -> dict[str, str]:

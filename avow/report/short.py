@@ -82,9 +82,10 @@ def weakest_words(case: Case) -> str:
         return a.refuted
     if a.weakest is None:
         return "There is none."
-    following = f" Next weakest: {a.next_weakest}." if a.next_weakest else ""
-    left_out = f" {a.unneeded}." if a.unneeded else ""
-    return f"{a.weakest.title}: “{a.weakest.quote}”: {a.weakest.words}.{following}{left_out}"
+    rest = f"Needed by {listed(a.weakest.needed_by)}" if a.weakest.needed_by else ""
+    following = f"Next weakest: {a.next_weakest}" * bool(a.next_weakest)
+    said = (f"{a.weakest.title}: “{a.weakest.quote}”: {a.weakest.words}", rest, following, a.unneeded)
+    return " ".join(f"{part}." for part in said if part)
 
 
 def _next(case: Case) -> str:

@@ -369,7 +369,7 @@ def hazard_rows(case: Case) -> list[tuple[str, str, str, str]]:
             ", ".join(filter(None, (view.hazard.severity, view.hazard.exposure))),
             f"{view.tone.mark} {view.stands}",
         )
-        for view in sorted(case.hazards, key=lambda view: WORST_FIRST.index(view.level))
+        for view in case.hazards
     ]
 
 

@@ -511,8 +511,8 @@ def test_each_tool_with_an_answer_that_counts_is_to_be_trusted_and_a_refuted_con
     made += [evidence(claims[2], Verdict.CHECKED, "ajpf"), evidence(contract, Verdict.REFUTED, "sanity")]
     found = case(system({"a": ["g", "h", "k"]}), [*claims, contract], made).answers
     (line,) = (line for line in found.trusted if line.what == "tools whose answers have no certificate")
-    named = sorted(record.tool_told for record in made)  # also one that refutes
-    assert line.which == f"1 answer of {named[0]}, 1 of {named[1]}, 1 of {named[2]}, 1 of 1 other tool"
+    named = ["ajpf 1.0", "hypothesis 1.0", "rosmonitoring 1.0", "sanity: z3 1.0"]  # also one that refutes
+    assert line.which == f"1 answer of {', 1 of '.join(named)}"
     assert found.based_on[0].words.endswith("; a check of its contract fails")
 
 
@@ -641,7 +641,7 @@ def test_what_rests_on_the_weakest_evidence_and_what_is_the_next() -> None:
     assert {d.key: d.claims for d in proved.deficits}.get("idle") is None
     idle = case(system({"a": ["g", "h"]}, requirements=asked[:1]), node, made)
     assert {d.key: d.claims for d in idle.deficits}["idle"] == (node[1].id,)
-    assert idle.answers.unneeded == "1 guarantee that no requirement or hazard needs is left out of this comparison"
+    assert idle.answers.unneeded == "1 guarantee needed by no requirement or hazard: not compared"
     assert weakest_words(idle).endswith(f"{idle.answers.unneeded}.")
     assert (whole.answers.unneeded, proved.answers.unneeded) == ("", "")
     assert {d.key: d.claims for d in whole.deficits}["underrated"] == (node[0].id, node[1].id)
@@ -685,6 +685,18 @@ def test_more_samples_never_make_a_claim_look_weaker() -> None:
     assert bound(("hypothesis", 0.128, False), ("experiment", 0.0618, True)) == "bound 6.18 %"
     assert bound(("hypothesis", 0.02, False), ("experiment", 0.0618, True)) == "bound 2 %"
     assert bound(("experiment", 0.0618, True), ("experiment-2", 0.1, True)) == "bound 10 %"
+
+
+def test_hazards_stand_by_level_and_then_by_their_weakest_evidence() -> None:
+    bounds = dict(zip(GUARANTEES, (0.1, 0.4, 0.2), strict=True))
+    records = [
+        evidence(g, Verdict.TESTED, "hypothesis", bound={"cases": 20, "failure_probability_below": b}, of=Object.SOURCE)
+        for g, b in bounds.items()
+    ]
+    named = [f"{g.node}.{g.name}" for g in GUARANTEES]
+    hazards = [Hazard(name, "It burns", "critical", mitigated_by=(name,)) for name in named]
+    found = build(records, formal=False, hazards=[*hazards, Hazard("bare", "It burns", "critical")])
+    assert [view.hazard.id for view in found.hazards] == ["bare", "a.h", "b.g", "a.g"]
 
 
 def test_what_refutes_is_the_weakest_evidence_in_data_and_words() -> None:

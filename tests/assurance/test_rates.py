@@ -96,10 +96,13 @@ def test_of_two_samples_of_a_claim_the_worse_counts() -> None:
     ],
 )
 def test_a_leaf_without_a_counted_rate_leaves_none(other: Evidence) -> None:
-    requirement = three(sampled("a.g"), sampled("b.g"), other).requirements[0]
+    found = three(sampled("a.g"), sampled("b.g"), other)
+    (requirement,) = found.requirements
     assert requirement.rate is not None
     assert not requirement.rate.bound
-    assert "unknown, as only experiments count trials of the robot's use, and none counts for c.g" in requirement.answer
+    assert "unknown, as no experiment counts trials of the robot's use for c.g" in requirement.answer
+    assert found.answers.unrated == "no experiment counts trials of the robot's use for c.g"
+    assert found.answers.unrated in found.answers.beside
 
 
 @pytest.mark.parametrize("wrong", [{"bound": "0.08"}, {"trials": 33}, {"bound": "-1"}, {"bound": "x"}])
@@ -188,7 +191,7 @@ def sure() -> list[Evidence]:
         (
             (*sure()[:2], evidence("c.g", Verdict.TESTED, "hypothesis")),
             Probability("0.7"),
-            "rate of the requirement unknown",
+            "failure rate in use unknown",
         ),
         ([evidence(f"{n}.g") for n in "abc"], Probability("0.99"), ""),
     ],
@@ -224,7 +227,7 @@ def test_a_limit_asks_for_joint_confidence_and_for_a_rate() -> None:
     assert "a confidence of 90 % is asked" in why
     passed, why = gate(three(*ALL[:2], evidence("c.g", Verdict.TESTED, "hypothesis"), policy=limit))
     assert not passed
-    assert "failure rate of the requirement unknown" in why
+    assert "failure rate in use unknown" in why
 
 
 SAYS_NO_STANDING = {

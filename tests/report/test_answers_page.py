@@ -98,7 +98,7 @@ def test_each_gate_that_fails_is_in_the_banner_and_each_hazard_on_the_first_scre
     assert f"{found.gates[0].title}: {found.gates[0].state}." in page, "the gates by name, under the pointer"
     assert "◐ argued argued: a person&#39;s word" in told
     assert pdf_data(found)["first"]["hazards"].startswith("✘ mitigation not shown: H1 It burns (critical)")
-    assert "Hazards: H0 mitigation argued, H1 mitigation not shown, " in comment(found)
+    assert "Hazards: H1 mitigation not shown, H2 mitigation not shown, " in comment(found)
     assert "| H8 | It burns | critical | ✘ no mitigation |" in render_markdown(found)
     bare = make_case(system({"n": ["g"]}, requirements=[asked]), [target], [evidence(target)])
     assert "none is declared" in render_answers(bare)

@@ -11,7 +11,7 @@ from collections import Counter
 from xml.etree import ElementTree
 
 import pytest
-from assurance.sample import case, evidence, guarantee, node_plan, obligation, rover_case, system
+from assurance.sample import case, evidence, guarantee, node_plan, obligation, rover_case, system, validated
 from assurance.test_rates import sampled, three
 from helpers import every_text
 
@@ -21,6 +21,7 @@ from avow.base.plain import count
 from avow.base.verdict import Verdict
 from avow.evidence.obligation import Kind
 from avow.evidence.status import Status
+from avow.recount import recounted
 from avow.report import gsn_svg, wording
 from avow.report.answers_page import render_index
 from avow.report.page import asset
@@ -221,6 +222,39 @@ def test_a_requirement_that_was_only_checked_says_within_what() -> None:
     assert "a1" * 32 not in answer
     # words are only words: what a claim rests on is said by typed hypotheses, so that these count for nothing
     assert {"agent/guarantee/g1", "the wind is weak"} <= {a.text for a in found.assumptions}
+
+
+@pytest.mark.parametrize(
+    ("own", "below", "words"),
+    [
+        (("compose", {"steps": 63}), {}, "every run within the plan's scenario was looked at, with 63 kinds of steps"),
+        (("ajpf", {"states": 1}), {}, "every case of a bounded model was looked at, with 1 state"),
+        (
+            None,
+            {"states": 5},
+            "within the bounds of agent.g1, every case of a bounded model was looked at, with 5 states",
+        ),
+        (None, None, ""),
+    ],
+)
+def test_what_holds_within_bounds_says_how_far_it_was_searched(
+    own: tuple[str, dict[str, int]] | None, below: dict[str, int] | None, words: str
+) -> None:
+    """Its own formula, or the claim below it that has the bounds."""
+    asked = Requirement("R", "It ends.", None, "eventually done", ("agent.g1",))
+    claim = obligation("system", Kind.REQUIREMENT, "R")
+    checked, (method, bound) = Verdict.CHECKED, own or ("compose", {})
+    records = [
+        evidence(G1) if below is None else evidence(G1, checked, "ajpf", bound=below),
+        evidence(claim, checked if own else Verdict.PROVED, method, bound=bound),
+    ]
+    found = case(system({"agent": ["g1"]}, requirements=[validated(asked)]), [G1, claim], records)
+    (requirement,) = found.requirements
+    assert requirement.noted == requirement.searched == words
+    assert requirement.bounded is bool(words)
+    made = texts(found)
+    assert words in made["index.html"].replace("&#39;", "'")
+    assert recounted(made["index.html"], made["report.json"].encode()) == []
 
 
 def test_measured_runs_say_how_they_were_made() -> None:
