@@ -448,7 +448,7 @@ def _holding(supported: Sequence[bool], asked: bool, excused: int = 0) -> str:
     """The text of a gate that passes: never more than holds."""
     if not supported:
         return "there are none"
-    counts = f"{sum(supported)} of {len(supported)} are supported"
+    counts = f"{sum(supported)} of {len(supported)} {'is' if len(supported) == 1 else 'are'} supported"
     if not asked:
         return f"the policy asks nothing of them; {counts}"
     return f"{counts}; {excused} excused by the plan" if excused else counts

@@ -22,7 +22,7 @@ from avow.base.percent import at_most
 from avow.evidence.ledger import Entry
 from avow.evidence.obligation import Kind
 from avow.evidence.record import Evidence
-from avow.evidence.status import effective, roll_up
+from avow.evidence.status import Status, effective, roll_up
 from avow.system.plan import Hazard
 
 Value = tuple[str, ...]
@@ -126,6 +126,7 @@ def _items(case: Case) -> Iterator[tuple[tuple[str, str], Mapping[str, Value]]]:
     yield ("policy", ""), dict(_flat(_fields(case.policy, Policy, "name", "title", "about")))
     for node in case.nodes:
         yield ("node", node.name), {"criticality": (node.criticality,)}
+    unproved = {v.id for v in case.obligations if v.status is not Status.PROVED}
     for r in case.requirements:
         yield (
             ("requirement", r.id),
@@ -137,7 +138,7 @@ def _items(case: Case) -> Iterator[tuple[tuple[str, str], Mapping[str, Value]]]:
                 "supported by": r.supported_by,
                 "failure rate": (r.rate.bound if r.rate else "",),
                 "weakest evidence": (r.weakest_evidence.bound if r.weakest_evidence else "",),
-                "search": (r.searched,),
+                "search": (r.searched if unproved.intersection(r.obligations) else "",),  # others: of claims below it
                 "source": (r.source,),
             },
         )

@@ -356,9 +356,7 @@ RULES = (
     _rule("", r"Not shown: (\d+) of (\d+) requirements?", lambda f, _m, _b: (str(f.lost()), str(len(f.requirements)))),
     _rule("", r"Not shown: (\d+) gates? fails?", _whole(lambda f: len(f.failing))),
     _rule("", r"(\d+) claims? about programs not run", lambda f, _m, _b: (str((f.deficit("programs") or (0, 0))[1]),)),
-    _rule(
-        "", r"(\d+) findings? against it, which the plan lists: ([\w, -]*\w)", lambda f, _m, _b: f.known()
-    ),
+    _rule("", r"(\d+) findings? against it, which the plan lists: ([\w, -]*\w)", lambda f, _m, _b: f.known()),
     _rule("", r"(\d+) kinds? of assurance deficit", _whole(_kinds)),
     _rule("head", r"Refuted: ([^␟]*?)(?: and (\d+) more)?(?=; | $| · |[ ,] ?\d)", _listed),
     _rule("head", r"; since then: ([^␟]*?)(?: and (\d+) more)?(?= ␟| $)", _since),

@@ -200,7 +200,9 @@ def _tested(outcome: Outcome, answer: Answer, own: Tried, wanted: int, seed: int
     replayed = f", {answer.replayed} that once refuted a guarantee of this node" if answer.replayed else ""
     if answer.replayed:
         bound["replayed"] = answer.replayed
-    chance = f"95 %: at most {at_most(failure_bound(least))} of such {'cases' if answer.runs is None else 'runs'} fail"
+    what = "cases" if answer.runs is None else "runs"
+    like = f"{what} like the {least} that met its condition" if least < counted else f"such {what}"
+    chance = f"95 %: at most {at_most(failure_bound(least))} of {like} fail"
     cases = f"{answer.valid} drawn cases"
     if answer.runs is not None:
         bound["runs"] = counted

@@ -381,9 +381,10 @@ class _Work:
         before = f", {self.replayed} that once refuted a guarantee of this node" if self.replayed else ""
         part = self.unanswered / self.messages
         before += f", {self.unanswered} messages without an answer ({part:.0%})" if self.unanswered else ""
+        like = f"runs like the {triggered} that judge it" if triggered < self.runs else "such runs"
         summary = (
             f"{self.runs} drawn runs of {self.messages} messages{before}: held at {count.held} judgements, none breaks "
-            f"it (seed {self.limits.seed}; 95 %: at most {at_most(failure_bound(triggered))} of such runs fail)"
+            f"it (seed {self.limits.seed}; 95 %: at most {at_most(failure_bound(triggered))} of {like} fail)"
         )
         details["meaning"] = MEANING
         return replace(outcome, verdict=Verdict.TESTED, summary=summary, bound=bound)

@@ -131,7 +131,7 @@ REVIEW = evidence("n.g", Verdict.REVIEWED, "review", details={"reviewers": ["A",
 
 def test_no_single_point_of_evidence() -> None:
     met = the_case("default", PROOF, TEST)
-    assert gate(met) == (True, "1 of 1 are supported: 1 proved and tested; 1 of a model only")
+    assert gate(met) == (True, "1 of 1 is supported: 1 proved and tested; 1 of a model only")
     asks = next(g.asks for g in met.gates if g.id == "guarantees-high")
     assert asks.startswith("proved or checked, supported by 2 independent methods, reviewed not")
     passed, reason = gate(the_case("default", PROOF))

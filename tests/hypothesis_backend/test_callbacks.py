@@ -109,6 +109,7 @@ def test_a_run_counts_only_if_the_guarantee_was_judged_in_it(tmp_path: Path) -> 
     assert isinstance(runs, int)
     assert isinstance(judged, int)
     assert 0 < judged < runs
+    assert f"% of runs like the {judged} that judge it fail)" in found.summary
     assert found.bound["failure_probability_below"] == failure_bound(judged)
     assert found.details["meaning"] == MEANING
 

@@ -55,6 +55,7 @@ def test_a_right_subject_is_tested_and_no_more(tmp_path: Path) -> None:
     triggers = low.details["triggers"]
     assert isinstance(triggers, list)
     assert triggers[0]["met"] == low.bound["triggered"]
+    assert f"% of cases like the {low.bound['triggered']} that met its condition fail)" in low.summary
 
 
 @pytest.mark.parametrize(
