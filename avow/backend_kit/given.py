@@ -64,7 +64,9 @@ def existing_file(job: Job, key: str, name: str, *, wrong: str, absent: str, hin
         raise Rejected(Diagnostic(wrong, f"'{name}' is not a file in the system's folder", place))
     if not path.is_file():
         message = f"there is no file '{name}' in the system's folder"
-        raise Rejected(Diagnostic(absent, message, place, hint=nearby(path, name) or hint))
+        raise Rejected(
+            Diagnostic(absent, message, place, hint=nearby(path, name) or hint or "write it there, or correct the path")
+        )
     return path
 
 

@@ -31,12 +31,8 @@ def yaml_fault(text: str, error: yaml.YAMLError | RecursionError) -> Malformed:
         mark = begun  # what is not ended is the fault, not the line at which that is noticed
     line, column = (mark.line + 1, mark.column + 1) if mark else (1, 1)
     if quote := _open_quote(text, noticed):
-        return Malformed(
-            f"the text that begins with this {text[quote.index]} is closed only on a later line, or never",
-            quote.line + 1,
-            quote.column + 1,
-            f"close it with {text[quote.index]} where it ends",
-        )
+        message = f"the text that begins with this {text[quote.index]} is closed only on a later line, or never"
+        return Malformed(message, quote.line + 1, quote.column + 1, f"close it with {text[quote.index]} where it ends")
     problem, hint = _in_words("yaml", error.problem or "not YAML")
     return _line_before(text.splitlines(), line - 1) or Malformed(problem, line, column, hint)
 

@@ -10,6 +10,7 @@ import click
 from avow.base.codec import document, to_json
 from avow.base.diagnostics import Diagnostic, Rejected, refuse
 from avow.base.verdict import Verdict
+from avow.base.workspace import system_folder
 from avow.calculus.composition import compose
 from avow.calculus.discharge import Bounds
 from avow.calculus.export import derived_contract
@@ -63,6 +64,7 @@ def command(
 
 def _nodes(path: Path, bounds: Bounds) -> tuple[tuple[Node, ...], Verdict]:
     """The nodes to compare, and whether they may be relied on: a derived contract only if its derivation is proved."""
+    path = path if path.suffix == ".rcl" or path.is_dir() else system_folder(str(path))
     if not path.is_dir():
         return load_contract([path]).nodes, Verdict.PROVED
     composition = compose(load_system(path))

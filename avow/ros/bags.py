@@ -261,7 +261,9 @@ def _readable(path: Path) -> Iterator[None]:
             why, hint = "the folder is empty", "copy the bag again"
         elif path.is_dir() and not (path / "metadata.yaml").exists():
             why = "its folder has no metadata.yaml"
-            hint = f"`ros2 bag reindex {path}` writes it from the recorded files"
+            inner = next((it.parent for it in sorted(path.glob("*/metadata.yaml"))), None)
+            remedy = f"`ros2 bag reindex {path}` writes it from the recorded files"
+            hint = f"name the bag in it: `{inner}`" if inner else remedy
         raise NoBag(f"{path} cannot be read as a bag: {why}", hint) from None
 
 

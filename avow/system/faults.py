@@ -35,6 +35,7 @@ _OF_NAMES = re.compile("RCL[23]")
 _QUOTED = re.compile(r"'([^']*)'")
 _NODE = re.compile(r"\s*node\b")
 _NAMELESS = ("RCL00", "RCL215", "RCL219")
+_PATHS = ("PLAN107", "PLAN108")
 _CAUSES = ("PLAN105", "ROS101", "ROS111", "ROS104", "DRIVE101")
 _PACKAGE = re.compile(r"the package (\w+)")
 _TYPE = re.compile(r"\b(\w+)/(?:(?:msg|srv|action)/)?([A-Z]\w*?)(?:_(?:Request|Response|Goal|Result|Feedback))?\b")
@@ -111,8 +112,8 @@ def every_fault(folder: Path, found: Iterable[Diagnostic], load: Load) -> tuple[
 def in_order(found: Iterable[Diagnostic]) -> tuple[Diagnostic, ...]:
     """Each fault once, file by file from top to bottom; a file that is not there once."""
     told = list(without_followers(found))
-    absent = {name for d in told if d.code == "PLAN107" for name in _QUOTED.findall(d.message)[:1]}
-    told = [d for d in told if d.code == "PLAN107" or absent.isdisjoint(re.findall("['`]([^'`]+)['`]", d.message))]
+    absent = {name for d in told if d.code in _PATHS for name in _QUOTED.findall(d.message)[:1]}
+    told = [d for d in told if d.code in _PATHS or absent.isdisjoint(re.findall("['`]([^'`]+)['`]", d.message))]
     once = {(d.code, d.span.line if d.span else 0, d.message): d for d in told}
     return tuple(
         sorted(once.values(), key=lambda d: (d.span.file, d.span.line, d.span.column) if d.span else ("", 0, 0))

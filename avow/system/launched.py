@@ -176,12 +176,9 @@ def started_with(launched: Started) -> tuple[dict[str, tuple[Any, Span]], tuple[
                 why, near = f"line {wrong.line}: {wrong}", wrong.hint
             elif isinstance(error, OSError):
                 why, near = error.strerror or why, nearby(Path(setting.value))
-            message = f"{launched.name} is started with the parameters of {what}, which are not read: {why}"
-            if setting.name:
-                message = f"{launched.name} is started with the parameter {what}, which is not read: {why}"
-                given = [one for one in given if one[1] != what]
-            else:
-                given = []  # it may set any of them
+            what = f"the parameter {what}, which is" if setting.name else f"the parameters of {what}, which are"
+            message = f"{launched.name} is started with {what} not read: {why}"
+            given = [one for one in given if setting.name and one[1] != setting.name]  # a file may set any of them
             hint = near or "see to it yourself that the plan's `source: {parameters: …}` has the same"
             unread.append(Diagnostic("ROS121", message, setting.span, Severity.WARNING, hint))
     there, doubts = settled(given)

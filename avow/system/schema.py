@@ -174,6 +174,8 @@ def _explain(error: Any, options: Located, whole: str, also: Iterable[Any] = ())
                 hint = "put it in quotes"
             elif kinds == ["object"] and isinstance(error.instance, str) and (keys := error.schema.get("required")):
                 hint = f"write `{{{', '.join(f'{key}: …' for key in keys)}}}`"
+            elif kinds == ["array"]:
+                hint = "write `- ` before each item"
             if "pattern" in error.schema and about:
                 yield fault(f"{about} is wanted, not {given}")
                 return

@@ -127,6 +127,8 @@ def test_refines(tmp_path: Path) -> None:
     code, output = invoke(refines_command, str(other), str(one), "--json")
     assert code == 1
     assert json.loads(output)["nodes"][0]["clauses"][0]["counterexample"] == {"out.x": "0"}
+    with pytest.raises(Rejected, match="there is no system 'two'"):
+        invoke(refines_command, str(one), "two")
 
 
 @pytest.mark.nightly

@@ -213,6 +213,12 @@ def test_within_a_workspace_only_the_system_is_made(tmp_path: Path) -> None:
     assert not (folder / "dodo.py").exists()
 
 
+def test_the_folder_around_a_bag_names_it(tmp_path: Path) -> None:
+    make_bag(tmp_path / "traces" / "run", "sqlite3")
+    done = avow("init", "w", "--from-bag", "traces", cwd=tmp_path)
+    assert (done.returncode, f"name the bag in it: `{Path('traces/run')}`" in done.stderr) == (2, True), done.stderr
+
+
 @pytest.mark.parametrize("form", ["sqlite3", "mcap"])
 def test_a_bag_without_its_metadata_wants_it(form: str, tmp_path: Path) -> None:
     bag = make_bag(tmp_path / "run", form)

@@ -234,6 +234,24 @@ def test_a_plan_without_a_contract_is_one_fault(name: str, hint: str, tmp_path: 
     assert [(d.code, hint in (d.hint or "")) for d in found.value.diagnostics] == [("PLAN107", True)]
 
 
+@pytest.mark.parametrize(
+    ("methods", "code", "hint"),
+    [
+        ("    source: {python: /x/y.py, class: A}\n    methods: [python]\n", "PLAN108", "a clone has all"),
+        ("    methods: [{hoare: {program: gone/c.imp}}]\n", "HOARE400", "write it there, or correct the path"),
+    ],
+)
+def test_a_program_that_is_elsewhere_is_one_fault(methods: str, code: str, hint: str, tmp_path: Path) -> None:
+    folder = place(tmp_path, [])
+    text, old = (folder / "plan.yaml").read_text(), "    methods:\n      - hoare: {program: control.imp}\n"
+    assert old in text
+    text = text.replace(old, methods).replace("      - review: {record: review.yaml}\n", "")
+    (folder / "plan.yaml").write_text(text)
+    printed = CliRunner().invoke(command("check"), [str(folder)]).output
+    assert re.findall(r"error\[(\w+)\]", printed) == [code], printed
+    assert hint in printed
+
+
 def test_a_port_without_its_node_in_a_requirement_names_the_nodes_that_have_it(tmp_path: Path) -> None:
     folder = place(tmp_path, [])
     text = (folder / "plan.yaml").read_text()

@@ -10,6 +10,7 @@ import pytest
 from helpers import keys_of
 
 from avow.backend_kit import given
+from avow.backend_kit.registry import backend, names
 from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.base.remembered import Shelf
 from avow.system import schema
@@ -68,6 +69,7 @@ def test_scalars_are_never_guessed(text: str, value: object) -> None:
         ("connections:\n  - {from: a, to: b.x}\n", 2, 12, "node.port"),
         ("connections:\n  - {to: b.x}\n", 2, 5, "'from' is missing"),
         ("connections:\n  - {from: a.x, to: b.x, initial: 3}\n", 2, 5, "the key 'delayed' is missing"),
+        ("nodes: {a: {methods: {hoare: {}}}}\n", 1, 22, "a list is wanted, not a mapping"),
         ("compose: {D1: {rule: R7}}\n", 1, 22, "not one of R1, R2, R3, R4"),
         ("compose: {start: {}}\n", 1, 11, "cannot be used here"),
         ("compose: {D.1: {}}\n", 1, 11, "cannot be used here"),
@@ -183,6 +185,21 @@ def test_did_you_mean(tmp_path: Path) -> None:
 def test_nesting_without_end_is_a_fault() -> None:
     with pytest.raises(Rejected, match="nested too deeply"):
         read_yaml(b"[" * 5000, "plan.yaml")
+
+
+def test_every_pattern_of_a_schema_is_described() -> None:
+    """The message says what is expected, and people do not read patterns."""
+    schemas = [plan_schema(), *(backend(name).options_schema for name in names())]
+    bare: list[str] = []
+
+    def walk(part: Any) -> None:
+        for inner in part.values() if isinstance(part, dict) else part if isinstance(part, list) else ():
+            walk(inner)
+        if isinstance(part, dict) and isinstance(part.get("pattern"), str) and "description" not in part:
+            bare.append(part["pattern"])
+
+    walk(schemas)
+    assert bare == []
 
 
 def test_faults_of_what_is_repeated_have_an_order(tmp_path: Path) -> None:

@@ -11,12 +11,8 @@ from avow.base.records import dataclass
 from avow.base.suggestions import did_you_mean, nearest
 
 HINT = "say what it does under `ros: {nodes: …}`, or give the value as `args` of the launch file in the plan"
-SILENT = frozenset(
-    re.findall(
-        r"\w+",
-        "param rosparam env set_env unset_env set_use_sim_time machine test master log description append_env",
-    )
-)
+_QUIET = "param rosparam env set_env unset_env set_use_sim_time machine test master log description append_env"
+SILENT = frozenset(re.split(" ", _QUIET))
 """Elements that start nothing and rename nothing."""
 NODES = ("node", "lifecycle_node", "node_container", "composable_node", "composable_node_container")
 _OTHERS = ("group", "timer", "load_composable_node", "push_ros_namespace", "remap", "include", "set_parameter")
