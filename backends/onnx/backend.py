@@ -3,6 +3,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
+from avow.backend_kit.box import box_files
 from avow.backend_kit.given import file_path, summarized
 from avow.backend_kit.one_step import refusal
 from avow.backend_kit.protocol import Backend, Job, Limits, OutsideCheck, Report, Tool
@@ -64,7 +65,7 @@ class OnnxBackend(Backend):
 
     def files(self, job: Job) -> tuple[Path, ...]:
         path = file_path(job, "network")
-        return () if path is None else (path,)
+        return (*(() if path is None else (path,)), *box_files(job.options, job.root))
 
     def export(self, job: Job) -> Mapping[str, str]:
         """Each case of each denied guarantee, as a query in VNN-LIB; none if the input is at fault."""

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
+from avow.backend_kit.box import BOX, Box, read_box
 from avow.backend_kit.given import existing_file
 from avow.backend_kit.protocol import Job
 from avow.base.diagnostics import Diagnostic, Rejected
@@ -14,7 +15,6 @@ from avow.base.packaged import packaged
 from avow.base.suggestions import suggest
 from avow.language.contract import Port
 from avow.language.sorts import BOOL, REAL, EnumSort, Sort, TupleSort
-from avow.language.terms import Compare, Literal, Term
 
 from .reading import Network, read_network
 
@@ -56,9 +56,7 @@ class Given:
     network: Network
     inputs: Mapping[str, tuple[Scaled, ...]]
     outputs: Mapping[str, Output]
-    box: tuple[Term, ...]
-    """As formulas; `box_text` is for people."""
-    box_text: str
+    box: Box
     one: Given | None = None
     """If `network` has two copies of a network and their rises, for two steps (`two_steps`): what is given of one."""
 
@@ -95,17 +93,11 @@ def read(job: Job) -> Given:
             outputs[name] = made
     if network is not None:
         faults += _indices(job, network, inputs, outputs)
-    box, shown = [], []
-    for at, (name, port, (low, high)) in _entries(job, "box", job.node.inputs, faults):
-        if port.sort != REAL or low > high:
-            what = "an interval without values" if port.sort == REAL else "no REAL"
-            faults.append(_fault(job, at, f"{name} is {what}"))
-        box += [Compare("<=", Literal(_exact(low), REAL), port.variable)]
-        box += [Compare("<=", port.variable, Literal(_exact(high), REAL))]
-        shown.append(f"{low} <= {name} <= {high}")
+    box, wrong = read_box(job.options.get(BOX, {}), job.node, job.root, "ONNX103", job.method.options.at(BOX))
+    faults += wrong
     if faults or network is None:
         raise Rejected(*faults)
-    return Given(network, inputs, outputs, tuple(box), " and ".join(shown))
+    return Given(network, inputs, outputs, box)
 
 
 def _entries(

@@ -13,10 +13,9 @@ from typing import Any
 from avow.backend_kit.given import file_path
 from avow.backend_kit.programs.judging import Formula
 from avow.backend_kit.protocol import Job, Limits
-from avow.base.files import sha256
 from avow.base.plain import count, decimal, listed
 from avow.base.tuning.effort import JUDGE_EFFORT
-from avow.base.verdict import Counterexample, Hypothesis, HypothesisKind, Outcome, Verdict
+from avow.base.verdict import Counterexample, Outcome, Verdict
 from avow.evidence.obligation import Obligation
 from avow.evidence.record import CASE
 from avow.formulas.conditions import conditions
@@ -72,7 +71,7 @@ class _Work:
 
     def outcome(self, obligation: Obligation) -> tuple[Outcome, str]:
         clause = self.job.clause(obligation)
-        assumed = {**{c.name: c.formula for c in self.job.node.assumptions}, **dict(_named(self.given.box))}
+        assumed = {**{c.name: c.formula for c in self.job.node.assumptions}, **dict(_named(self.given.box.terms))}
         found, count, left = _Found(), 0, list[Term]()
         each = claims(clause.formula, assumed, self.given)
         for claim in each:
@@ -180,10 +179,6 @@ class _Work:
             f"proved of the network in exact reals: {count(cases, 'case')} of its denial, {found.by_intervals} "
             f"excluded by interval bounds and {found.by_marabou} by Marabou"
         )
-        rests: tuple[Hypothesis, ...] = ()
-        if self.given.box_text:
-            name, text = f"{self.job.node.name}/assumption/box", f"the plan's box: {self.given.box_text}"
-            rests = (Hypothesis(HypothesisKind.ASSUMPTION, name, sha256(text), text),)
         return Outcome(
             obligation.id,
             Verdict.PROVED,
@@ -191,7 +186,7 @@ class _Work:
             hypotheses=(*hypotheses, *self.supposed(found)),
             details=details,
             vacuous=_vacuous(claim),
-            rests_on=rests,
+            rests_on=self.given.box.hypotheses(self.job.node.name),
         )
 
     def supposed(self, found: _Found) -> Iterable[str]:
@@ -207,7 +202,9 @@ class _Work:
         """Runs the network within what the assumptions say (else near zero). Why no proof would count, if so."""
         network, boxes = self.given.network, list[Box]()
         with contextlib.suppress(NotLinear):
-            cases, _ = denials(FALSE, [c.formula for c in self.job.node.assumptions] + [*self.given.box], self.given)
+            cases, _ = denials(
+                FALSE, [c.formula for c in self.job.node.assumptions] + [*self.given.box.terms], self.given
+            )
             boxes = [box(case, network.inputs) for case in cases]
         known = [found for each in boxes if all(None not in pair for pair in each) and (found := sides(each))]
         for within in known or [((-1.0, 1.0),) * network.inputs]:

@@ -19,7 +19,7 @@ SCALED = "(* "
 
 def queries(job: Job, given: Given) -> Iterator[tuple[str, str, str]]:
     """The guarantee's name, a file's name, and its text. None for a guarantee that is not linear or of two steps."""
-    assumed = [*(clause.formula for clause in job.node.assumptions), *given.box]
+    assumed = [*(clause.formula for clause in job.node.assumptions), *given.box.terms]
     for obligation in job.obligations:
         if histories(formula := job.clause(obligation).formula):  # of two networks: the format is of one
             continue

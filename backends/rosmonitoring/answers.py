@@ -17,7 +17,10 @@ from typing import TYPE_CHECKING, Any
 from avow.formulas.formula import free_variables
 from avow.formulas.values import Value
 from avow.language.contract import ClauseKind
+from avow.ros.bags import publisher
 
+from .guarding import FALLBACK
+from .options import same_topic
 from .pace import Passage
 from .pairing import EARLY, Asked, Choices, ticks, time_of
 from .reading import Reader
@@ -155,6 +158,9 @@ def own(monitor: Monitor, readers: list[tuple[str, Reader]], event: Mapping[str,
     for watched in monitor.about(unknown):
         watched.tally.unnamed(str(event["topic"]))
         monitor.lose(watched)
+    topic = same_topic(str(event["topic"]))
+    if publisher(event) == FALLBACK and topic in monitor.setup.filtered:
+        monitor.timing.passages.setdefault(topic, Passage()).replaced += 1
     return [(name, read) for name, read in readers if monitor.setup.whose(name, event)]
 
 

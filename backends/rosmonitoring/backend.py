@@ -11,6 +11,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from avow.backend_kit.box import box_files
 from avow.backend_kit.further import unknown_outside
 from avow.backend_kit.given import DURATION, READING, schema
 from avow.backend_kit.protocol import Backend, Job, JudgedRun, Limits, Opens, OutsideCheck, Report, Translated
@@ -129,7 +130,7 @@ class RosMonitoringBackend(Backend):
                 found += sorted(p for p in path.rglob("*") if p.is_file())
             elif path is not None:
                 found.append(path)
-        found += message_files(job.system.plan.messages)
+        found += [*box_files(job.options, job.root), *message_files(job.system.plan.messages)]
         scenario = job.system.plan.scenario
         found += [t.path for t in scenario.tables if t.path is not None] if scenario else []
         return tuple(found)

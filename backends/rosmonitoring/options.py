@@ -8,6 +8,7 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
+from avow.backend_kit.box import BOX, Box, read_box
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.files import inside
 from avow.base.plain import listed
@@ -25,6 +26,7 @@ from avow.system.graph import dataflow
 from avow.system.plan import Edge, Located, System
 
 from . import observing
+from .guarding import FALLBACK, Fallback, bounded, fallbacks
 from .pace import NO_TIME, RATE, By, Leeway, Rate, duration
 from .pairing import NUMBER, Answers
 from .parameters import concerns, constant, kept, parameter
@@ -62,6 +64,10 @@ class Setup:
     """The number of messages that may have been lost; None: any number."""
     filtered: frozenset[str] = frozenset()
     """The topics (without their leading slash) whose messages a filter passes on only while nothing is broken."""
+    fallback: Mapping[str, Fallback] = field(default_factory=dict)
+    """Some of these topics: the fields with which a message is passed on that is otherwise withheld."""
+    box: Box = field(default_factory=Box)
+    """Bounds of the inputs, which are an assumption of `node`, `BOX`, too."""
     leeway: Leeway = field(default_factory=Leeway)
     time: By = By.RECEIPT
     """The clock by which its messages are timed."""
@@ -74,13 +80,15 @@ class Setup:
         """Whether an event's message is the node's own, for a variable that it carries; None if that is not known. A
         message without a name is taken for the node's own if the contract has no other publisher; so is any that a
         filter guards."""
-        by, concerned = publisher(event), concerns(self.rules[name], event)
-        if concerned is not None:
+        by, output = publisher(event), name.startswith(f"{Role.OUTPUT}.")
+        if (concerned := concerns(self.rules[name], event)) is not None:
             return concerned
+        if by == FALLBACK and output:
+            return False
         if name in self.shared:
             return by == self.placed if by in self.shared[name] else None
         guarded = same_topic(self.carried[name].topic) in self.filtered
-        return None if self.strange(by) and name.startswith(f"{Role.OUTPUT}.") and not guarded else True
+        return None if self.strange(by) and output and not guarded else True
 
     def strange(self, by: str) -> bool:
         """Whether this is the name of a node, and not of this one."""
@@ -148,11 +156,16 @@ def setup(
     named, leeway = tuple((_called(system, node, t), t.ros_type) for t in node.topics), work.leeway(data)
     answers = work.answers(data.get("answers"), leeway.jitter)
     node = kept(system, node, work.rules, known)
+    box, wrong = read_box(data.get(BOX, {}), node, system.plan.root, "MON101", options.at(BOX) if options else None)
+    work.faults += wrong
+    work.heard(BOX, () if wrong else data.get(BOX))  # a clause about what no message carries is not judged
+    fallback = fallbacks(data, work.rules, known, work.wrong)
     made = Setup(
-        node, work.rules, work.hidden, str(data.get("when", "outputs")), known, answers,
+        bounded(node, box, work.wrong), work.rules, work.hidden, str(data.get("when", "outputs")), known, answers,
         float(data.get("decided", DECIDED_SHARE)), named, work.fresh(data.get("fresh")), work.rates(data.get("rate")),
         work.duration("max_age", data["max_age"]) if "max_age" in data else None, data.get("losses"), work.filtered(),
-        leeway, By(str(data.get("time", By.RECEIPT))), work.shared, system.plan.ros.names.placed(node.name).name,
+        fallback, box, leeway, By(str(data.get("time", By.RECEIPT))), work.shared,
+        system.plan.ros.names.placed(node.name).name,
     )  # fmt: skip
     return made, tuple(work.faults)
 

@@ -125,6 +125,8 @@ class Passage:
     """Why a loss may not be visible."""
     unheard: str = ""
     """Why messages were not heard, according to the one who recorded."""
+    replaced: int = 0
+    """Those that a filter passed on in place of withheld ones."""
     gap: bool = False
     """Some may have been published since the latest one."""
     latest: Fraction | None = None

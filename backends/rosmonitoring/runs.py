@@ -166,7 +166,7 @@ def _excuse(job: Job, runs: list[Run]) -> str:
     if first is None:
         return "an assumption was broken"
     trace, broken = first
-    spoken = {v.name for v in ports_of(job.node.clause(broken.clause).formula)}
+    spoken = {v.name for v in ports_of(runs[0].monitor.setup.node.clause(broken.clause).formula)}
     feeding = [e for e in dataflow(job.system).feeding(job.node.name) if e.target.port in spoken]
     late = " one step before" if any(e.delayed for e in feeding) else ""
     who = " and ".join(dict.fromkeys(str(e.source) for e in feeding))

@@ -9,13 +9,14 @@ from typing import Any
 
 import numpy.typing as npt
 
+from avow.backend_kit.box import BOX
 from avow.backend_kit.given import misshapen
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.suggestions import suggest
 from avow.formulas.formula import free_variables
 from avow.language.contract import ClauseKind
 from avow.language.terms import Role
-from avow.ros.bags import is_bag, recorded
+from avow.ros.bags import PUBLISHER, Event, is_bag, recorded
 from avow.ros.definitions import Definitions
 from avow.system.plan import System
 
@@ -25,9 +26,11 @@ from .batch import of_arrays, of_messages
 from .blame import Blame
 from .columns import Columns
 from .engine import Monitor
+from .guarding import FALLBACK
 from .notes import readable
 from .observing import NAME, method_of
 from .options import Setup, known_types, origin, same_topic, setup
+from .pace import Passage
 from .rules import NOTHING_KNOWN
 from .traces import Services, opened, transforms
 from .watched import Fault, Tally, Violation, remedies, too_old
@@ -70,12 +73,19 @@ def filtered(setups: Iterable[Setup]) -> frozenset[str]:
     return frozenset(found)
 
 
+def outside(monitor: Monitor) -> bool:
+    """Whether the node's inputs are not known to be in the plan's box."""
+    found = (w for w in monitor.assumptions if w.clause.name == BOX and monitor.setup.box.terms)
+    return any(not monitor.values.keys() >= {*w.names} or w.truth_of(monitor.values) is not True for w in found)
+
+
 def _report_withheld(monitors: Iterable[Monitor], counts: Mapping[str, int]) -> None:
     """A record behind a filter holds what its node published, and what was passed on. If fewer messages were passed on,
     the filter met the guarantees, and the record is no evidence about the node."""
     for monitor in monitors:
         for topic in sorted(monitor.setup.filtered):
-            published, passed = counts.get(raw(topic), 0), counts.get(topic, 0)
+            passage = monitor.timing.passages.get(topic, Passage())
+            published, passed = counts.get(raw(topic), 0), counts.get(topic, 0) - passage.replaced
             if published > passed:
                 reason = f"{published - passed} of {published} messages of {topic} were withheld by a filter"
                 monitor.backwards = monitor.backwards or reason
@@ -118,9 +128,9 @@ class Session:
         self.heard(topic if isinstance(topic, str) else "", 1)
         yield from self.with_causes([v for monitor in self.monitors for v in monitor.step(event)])
 
-    def offer(self, event: Mapping[str, Any]) -> tuple[list[Violation], bool]:
-        """The violations in a message of a filtered topic, and whether it may be passed on. Monitors of other nodes
-        receive it only then."""
+    def offer(self, event: Mapping[str, Any]) -> tuple[list[Violation], Event | None]:
+        """The violations in a message of a filtered topic, and what is passed on: the message, its fallback, or None.
+        Monitors of other nodes receive only that."""
         topic = str(event["topic"])
         self.heard(topic, 1)
         own = [m for m in self.monitors if same_topic(topic) in m.setup.filtered]
@@ -128,11 +138,16 @@ class Session:
         # faults of earlier messages may be reported only now, and those of this one only later
         passed = not any(v.fault in WITHHELD and v.index == m.events for m in own for v in found)
         passed = passed and not any(m.doubts is not None and m.doubts.latest == m.events for m in own)
+        passed = passed and not any(map(outside, own))
+        given: Event | None = event
         if not passed:
             self.withheld[topic] = self.withheld.get(topic, 0) + 1
-        others = event if passed else {"topic": raw(topic), "time": event["time"]}
+            fields = next((f for m in own if (f := m.setup.fallback.get(same_topic(topic)))), {})
+            # a message that cannot be read has no fields to replace
+            given = {**event, **fields, PUBLISHER: FALLBACK} if fields and fields.keys() <= event.keys() else None
+        others = given or {"topic": raw(topic), "time": event["time"]}
         found += [v for m in self.monitors if m not in own for v in m.step(others)]
-        return list(self.with_causes(found)), passed
+        return list(self.with_causes(found)), given
 
     def tick(self, event: Mapping[str, Any]) -> Iterator[Violation]:
         """Time has passed without a message."""

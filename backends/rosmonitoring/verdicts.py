@@ -235,4 +235,5 @@ RULES: tuple[Callable[[Shown], Answer | None], ...] = (
 def outcome(obligation: str, shown: Shown) -> Outcome:
     answer = next(found for rule in RULES if (found := rule(shown)) is not None)
     vacuous = answer.verdict is Verdict.MONITORED and shown.vacuous
-    return Outcome(obligation, answer.verdict, answer.summary, answer.shown, bound=shown.bound, vacuous=vacuous)
+    made = Outcome(obligation, answer.verdict, answer.summary, answer.shown, bound=shown.bound, vacuous=vacuous)
+    return replace(made, rests_on=shown.setup.box.hypotheses(shown.setup.node.name))

@@ -157,6 +157,16 @@ def test_scales_and_a_box(tmp_path: Path) -> None:
     assert judged(tmp_path / "2", "out.z <= 22.1", STRAIGHT, ONE, **SCALED).verdict is Verdict.REFUTED
 
 
+def test_the_range_of_the_training_data_is_a_box(tmp_path: Path) -> None:
+    for greatest, verdict in (("1", Verdict.PROVED), ("1.1", Verdict.REFUTED)):
+        (tmp_path / greatest / "system").mkdir(parents=True)
+        (tmp_path / greatest / "system/seen.csv").write_text(f"run,x\n1,0.25\n2,{greatest}\n3,0\n")
+        box = {"in.x": {"data": "seen.csv", "column": "x"}}
+        found = judged(tmp_path / greatest, "out.z <= 22.1", STRAIGHT, ONE, **SCALED, box=box)
+        assert found.verdict is verdict
+        assert verdict is Verdict.REFUTED or [h.text for h in found.rests_on] == ["the plan's box: 0 <= in.x <= 1"]
+
+
 def test_a_port_without_bounds_is_named(tmp_path: Path) -> None:
     found = judged(tmp_path, "out.z <= 3", STRAIGHT, ONE.replace("0 <= in.x and ", ""), **ONE_OPTIONS)
     assert found.verdict is Verdict.UNKNOWN

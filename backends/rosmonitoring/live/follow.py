@@ -12,7 +12,7 @@ from contextlib import ExitStack
 from pathlib import Path
 
 from avow.base.diagnostics import Diagnostic, Rejected
-from avow.ros.bags import LIVE, Event
+from avow.ros.bags import LIVE, PUBLISHER, Event
 from avow.ros.calls import is_part
 from avow.ros.dds import carriers, domain_of
 
@@ -60,9 +60,10 @@ def follow(
                 if heard.forward is not None:
                     said = {**event, "topic": heard.topic.removesuffix(RAW)}
                     found, passed = running.offer(said)
-                    if passed:
-                        heard.forward()
-                        lines.append(said)
+                    if passed is not None:
+                        changed = {k: v for k, v in passed.items() if k != PUBLISHER and v is not said[k]}
+                        heard.forward(changed)
+                        lines.append(passed)
                 else:
                     found = list(running.step(event))
                 if file is not None:

@@ -18,6 +18,10 @@ OK, WARN, ERROR, STALE = range(4)
 """Levels of a `diagnostic_msgs/DiagnosticStatus`."""
 
 
+Forward = Callable[[Event], None]
+"""Passes a message on, with other values of some fields."""
+
+
 @dataclass(frozen=True, slots=True)
 class Heard:
     """One message, the time at which it came, and its reader (which raises ValueError); or (`read` None) the trouble
@@ -28,8 +32,8 @@ class Heard:
     read: Callable[[], Event] | None
     trouble: str = ""
     mark: str = LOST
-    forward: Callable[[], None] | None = None
-    """For a filtered topic: passes the message on."""
+    forward: Forward | None = None
+    """For a filtered topic."""
 
 
 class Inbox:
@@ -41,7 +45,7 @@ class Inbox:
         self._full: set[str] = set()
         """The topics of the messages that came since there was no room."""
 
-    def message(self, topic: str, read: Callable[[float], Event], forward: Callable[[], None] | None = None) -> None:
+    def message(self, topic: str, read: Callable[[float], Event], forward: Forward | None = None) -> None:
         """A message has come just now; it is read, as an event of that time, when it is judged."""
         with self._lock:
             now = time.time()

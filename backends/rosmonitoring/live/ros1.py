@@ -6,6 +6,7 @@ messages, each after its length. The header of a publisher's answer has the full
 
 from __future__ import annotations
 
+import dataclasses
 import itertools
 import os
 import socket
@@ -95,8 +96,9 @@ class Ros1:
         self._slave.shutdown()
         self._slave.server_close()
 
-    def _forward(self, topic: str, fields: Mapping[str, str]) -> Callable[[bytes], None] | None:
-        """A function that passes a topic's messages on unchanged; None for a topic that is not filtered."""
+    def _forward(self, topic: str, fields: Mapping[str, str]) -> Callable[[bytes, Event], None] | None:
+        """A function that passes a topic's messages on, with other values of some fields; None for a topic that is not
+        filtered."""
         target = self._filtered.get(topic)
         if target is None:
             return None
@@ -106,7 +108,15 @@ class Ros1:
                 self.speak(target, fields["type"], fields["message_definition"], fields["md5sum"], latch=latch)
             if self._spoken[target].digest != fields["md5sum"]:
                 raise ValueError(f"its {fields['type']} is made otherwise than that of another publisher")
-            return self._spoken[target].say
+        store, kind = typed(topic, fields)
+
+        def forward(said: bytes, changed: Event) -> None:
+            if changed:
+                made: Any = store.deserialize_ros1(said, kind)
+                said = bytes(store.serialize_ros1(dataclasses.replace(made, **changed), kind))
+            self._spoken[target].say(said)
+
+        return forward
 
     def speak(self, topic: str, kind: str, definition: str, digest: str, *, latch: bool = True) -> Spoken:
         """Advertise a topic."""
@@ -321,8 +331,8 @@ def _exactly(line: socket.socket, count: int) -> bytes:
     return b"".join(parts)
 
 
-def reader(topic: str, fields: Mapping[str, str]) -> Callable[[bytes], dict[str, Any]]:
-    """A reader of a publisher's messages. Raises ValueError if its definition contradicts itself."""
+def typed(topic: str, fields: Mapping[str, str]) -> tuple[Any, str]:
+    """The type of a publisher's messages: its store and name. Raises ValueError if its definition is wrong."""
     store = get_typestore(Stores.EMPTY)
     kind = fields.get("type", "")
     package, _, name = kind.partition("/")
@@ -334,13 +344,19 @@ def reader(topic: str, fields: Mapping[str, str]) -> Callable[[bytes], dict[str,
         raise ValueError(f"{topic} is {kind or 'of no type'}, whose definition cannot be read: {error}") from None
     if digest != fields.get("md5sum"):
         raise ValueError(f"{topic}: the digest of {kind} is not that of the definition that came with it")
+    return store, full
+
+
+def reader(topic: str, fields: Mapping[str, str]) -> Callable[[bytes], dict[str, Any]]:
+    """A reader of a publisher's messages. Raises ValueError if its definition contradicts itself."""
+    store, full = typed(topic, fields)
     plain = plainer(store.fielddefs)
 
     def read(raw: bytes) -> dict[str, Any]:
         try:
             found: dict[str, Any] = plain(store.deserialize_ros1(raw, full))
         except (SerdeError, struct.error, IndexError, UnicodeDecodeError, AssertionError) as error:
-            raise ValueError(f"a message of {topic} is no {kind}: {error}") from None
+            raise ValueError(f"a message of {topic} is no {fields['type']}: {error}") from None
         return found
 
     return read
