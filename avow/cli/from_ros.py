@@ -61,15 +61,8 @@ def draft_system(
         if seen and not any(one.count for one in seen.values()):
             differences += (f"{bag.name} has no message of these topics: the draft has no recorded values",)
         listing, unsaid = _together(listing, found, heard)
-        given = replace(
-            given,
-            known=known,
-            seen=seen,
-            ros2=found.ros2,
-            unsaid=unsaid,
-            traces={f"traces/{bag.name}": digest_trace(bag)},
-            ends=recorded(bag) if found.ros2 else (),
-        )
+        traces, ends = {f"traces/{bag.name}": digest_trace(bag)}, recorded(bag) if found.ros2 else ()
+        given = replace(given, known=known, seen=seen, ros2=found.ros2, unsaid=unsaid, traces=traces, ends=ends)
         origins.append(bag.name)
     assert listing is not None
     if graph is not None:
@@ -82,8 +75,8 @@ def draft_system(
         raise Rejected(Diagnostic("CLI011", f"{' and '.join(origins)}: no node has a topic", hint=hint))
     given = replace(given, messages=_own_types(listing, known, base))
     graph_file = "models/rosgraph.txt" if graph is not None else None
-    ends = (*given.ends, *(printed(qos) if qos else ()))
-    given = replace(given, listing=replace(listing, qos=qos), ends=ends, origin=" and ".join(origins), graph=graph_file)
+    given = replace(given, ends=(*given.ends, *(printed(qos) if qos else ())))
+    given = replace(given, listing=replace(listing, qos=qos), origin=" and ".join(origins), graph=graph_file)
     made = draft(given)
     if made.unknown:
         text = f"not known: {', '.join(made.unknown)}; the topics of these types have no ports: draft again with"

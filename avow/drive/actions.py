@@ -51,26 +51,73 @@ LEADS = {
 """State of a goal → the states before it."""
 
 
-class _Action(Strict):
-    """The topics of an action."""
+class Action(Strict):
+    """The topics of an action, which ROS 1 and ROS 2 share here."""
 
-    def __init__(self, called: str, node: Any, action_type: Any, action_name: str, more: dict[str, Any]) -> None:
-        for name in [name for name in more if name.endswith("_qos_profile")]:
-            node._avow_plain(called, {}, more.pop(name), object)
-        group = more.get("callback_group")
-        node._avow_plain(called, more, 0)
+    succeeded = int(GoalStatus.SUCCEEDED)
+    """The status of a result that comes without one."""
+
+    def __init__(self, action_type: Any, action_name: str) -> None:
         driven = self._driven
         if action_type not in driven.services:
             raise TypeError(f"{action_type!r} is no action class")
-        self.action, self.kind, self.group = action_type, driven.services[action_type], group
+        self.action, self.kind = action_type, driven.services[action_type]
         self.name = driven.whole(action_name)
         self.goal, self.result, self.feedback = (f"{self.name}/{end.lower()}" for end in ACTION)
-        own = f"{self.name}/_action"
-        self.sent, self.told, self.cancel = (
-            f"{own}/send_goal/_response",
-            f"{own}/get_result/_response",
-            f"{own}/cancel_goal",
-        )
+        self.sent, self.got = (f"{self.name}/_action/{of}/_response" for of in ("send_goal", "get_result"))
+        self.whole = self.got in driven.topics
+
+    def plain(self, called: str, node: Any, more: dict[str, Any]) -> None:
+        """Refuses what rclpy's class is given and is not driven."""
+        for name in [name for name in more if name.endswith("_qos_profile")]:
+            node._avow_plain(called, {}, more.pop(name), object)
+        node._avow_plain(called, more, 0)
+        self.group = more.get("callback_group")
+
+    def serve(self, act: Any) -> None:
+        """Has goals handled by `act`, which is given a goal and the call."""
+        driven = self._driven
+        driven.spoken |= {self.result: f"{self.kind}_Result", self.feedback: f"{self.kind}_Feedback"}
+        driven.spoken |= {self.got: f"{self.kind}{TOLD}"} if self.whole else {}
+        if self.goal in driven.heard:
+            raise TypeError(f"{self.name} has two servers")
+        kind = f"{self.kind}_Goal"
+        driven.heard[self.goal] = ((kind, lambda goal: act(goal, str(driven.number or driven.new_call()))),)
+
+    def tell(self, status: int, result: Any, call: str) -> None:
+        """The result of a goal."""
+        if type(result) is not self.action.Result:
+            raise TypeError(f"the result of a goal is {result!r}, and no {self.kind}.Result")
+        if self.whole:
+            made = self._driven.classes[f"{self.kind}{TOLD}"](status=int(status), result=result)
+            self._driven.say(self.got, made, call)
+        self._driven.say(self.result, result, call)
+
+    def ask(self) -> None:
+        """Sends goals, and hears feedback and results."""
+        driven = self._driven
+        driven.spoken[self.goal] = f"{self.kind}_Goal"
+        driven.await_on(self.feedback, f"{self.kind}_Feedback", last=False)
+        driven.await_on(*((self.got, f"{self.kind}{TOLD}") if self.whole else (self.result, f"{self.kind}_Result")))
+
+    def send(self, goal: Any) -> str:
+        """The call of a goal."""
+        if type(goal) is not self.action.Goal:
+            raise TypeError(f"{goal!r} is no {self.kind}.Goal")
+        call = self._driven.new_call()
+        self._driven.say(self.goal, goal, call)
+        return str(call)
+
+    def follow(self, call: str, heard: Any, ended: Any) -> None:
+        """Calls `heard` with the goal's feedback, and `ended` with its result, as an object with a status."""
+
+        def done(message: Any) -> None:
+            waiting = self._driven.waiting
+            waiting[self.feedback] = tuple(each for each in waiting[self.feedback] if each[0] != call)
+            ended(message if self.whole else types.SimpleNamespace(status=self.succeeded, result=message))
+
+        self._driven.expect(self.feedback, call, heard)
+        self._driven.expect(self.got if self.whole else self.result, call, done)
 
 
 class ServerGoalHandle(Strict):
@@ -121,42 +168,29 @@ class ServerGoalHandle(Strict):
             self._server.answer(self, response)
 
 
-class ActionServer(_Action):
+class ActionServer(Action):
     _called = "rclpy.action.ActionServer"
 
     def __init__(
-        self,
-        node: Any,
-        action_type: Any,
-        action_name: str,
-        execute_callback: Any,
-        *,
-        goal_callback: Any = lambda goal: GoalResponse.ACCEPT,
+        self, node: Any, action_type: Any, action_name: str, execute_callback: Any, *,
+        goal_callback: Any = lambda goal: GoalResponse.ACCEPT, result_timeout: float = 900,
         handle_accepted_callback: Any = lambda handle: handle.execute(),
-        cancel_callback: Any = lambda handle: CancelResponse.REJECT,
-        result_timeout: float = 900,
-        **more: Any,
-    ) -> None:
-        super().__init__("ActionServer", node, action_type, action_name, more)
-        driven = self._driven
+        cancel_callback: Any = lambda handle: CancelResponse.REJECT, **more: Any,
+    ) -> None:  # fmt: skip
+        super().__init__(action_type, action_name)
+        self.plain("ActionServer", node, more)
+        driven, cancel = self._driven, f"{self.name}/_action/cancel_goal"
         if not callable(execute_callback):
             raise TypeError("Failed to register goal execution callback: not callable")
         self.handles: list[ServerGoalHandle] = []
         self.ended: set[str] = set()
         self.on_goal, self.on_accepted, self.on_cancel = goal_callback, handle_accepted_callback, cancel_callback
         self.on_execute = execute_callback
-        driven.spoken |= {self.result: f"{self.kind}_Result", self.feedback: f"{self.kind}_Feedback"}
-        more_topics = {self.sent: f"{self.kind}{SENT}", self.told: f"{self.kind}{TOLD}"}
-        driven.spoken |= {topic: kind for topic, kind in more_topics.items() if topic in driven.topics}
-        if self.goal in driven.heard:
-            raise TypeError(f"{self.name} has two servers")
-        act = driven.turn(self.group, self.requested)
-        driven.heard[self.goal] = (
-            (f"{self.kind}_Goal", lambda goal: act(goal, str(driven.number or driven.new_call()))),
-        )
-        if f"{self.cancel}/_request" in driven.topics:
+        self.serve(driven.turn(self.group, self.requested))
+        driven.spoken |= {self.sent: f"{self.kind}{SENT}"} if self.sent in driven.topics else {}
+        if f"{cancel}/_request" in driven.topics:
             service = next(kind for kind, name in driven.services.items() if name == CANCEL)
-            driven.serve(self.cancel, service, lambda request: self.canceled(service, request), self.group)
+            driven.serve(cancel, service, lambda request: self.canceled(service, request), self.group)
 
     def requested(self, goal: Any, call: str) -> None:
         accepted = self._driven.call(self.on_goal, goal) is GoalResponse.ACCEPT
@@ -182,16 +216,9 @@ class ActionServer(_Action):
 
     def answer(self, handle: ServerGoalHandle, result: Any) -> None:
         """The result of a goal, once. An exception of the class, for which rclpy sends a default, is raised."""
-        if handle.call in self.ended:
-            return
-        if type(result) is not self.action.Result:
-            raise TypeError(f"the result of a goal is {result!r}, and no {self.kind}.Result")
-        self.ended.add(handle.call)
-        driven = self._driven
-        if self.told in driven.topics:
-            made = driven.classes[f"{self.kind}{TOLD}"](status=int(handle.status), result=result)
-            driven.say(self.told, made, handle.call)
-        driven.say(self.result, result, handle.call)
+        if handle.call not in self.ended:
+            self.tell(handle.status, result, handle.call)
+            self.ended.add(handle.call)
 
     def canceled(self, service: Any, request: Any) -> Any:
         """The response to a request to cancel: of a goal, of all up to a time, of all."""
@@ -225,17 +252,14 @@ class ClientGoalHandle(Strict):
         return self._result
 
 
-class ActionClient(_Action):
+class ActionClient(Action):
     _called = "rclpy.action.ActionClient"
 
     def __init__(self, node: Any, action_type: Any, action_name: str, **more: Any) -> None:
-        super().__init__("ActionClient", node, action_type, action_name, more)
-        driven = self._driven
-        driven.spoken[self.goal] = f"{self.kind}_Goal"
-        driven.await_on(self.sent, f"{self.kind}{SENT}")
-        driven.await_on(self.feedback, f"{self.kind}_Feedback", last=False)
-        self.whole = self.told in driven.topics
-        driven.await_on(*((self.told, f"{self.kind}{TOLD}") if self.whole else (self.result, f"{self.kind}_Result")))
+        super().__init__(action_type, action_name)
+        self.plain("ActionClient", node, more)
+        self._driven.await_on(self.sent, f"{self.kind}{SENT}")
+        self.ask()
 
     def wait_for_server(self, timeout_sec: Any = None) -> bool:
         return True
@@ -244,31 +268,20 @@ class ActionClient(_Action):
         return True
 
     def send_goal_async(self, goal: Any, feedback_callback: Any = None, goal_uuid: Any = None) -> Future:
-        driven, sent, result, call = self._driven, Future(), Future(), self._driven.new_call()
-
-        def wait(topic: str, act: Any) -> None:
-            driven.waiting[topic] = (*driven.waiting.get(topic, ()), (call, act))
+        driven, sent, result = self._driven, Future(), Future()
 
         def heard(feedback: Any) -> None:
             if feedback_callback is not None:
                 made = types.SimpleNamespace(goal_id=goal_uuid, feedback=feedback)
                 driven.turn(self.group, lambda: driven.call(feedback_callback, made))()
 
-        def ended(message: Any) -> None:
-            driven.waiting[self.feedback] = tuple(each for each in driven.waiting[self.feedback] if each[0] != call)
-            status = int(GoalStatus.SUCCEEDED)
-            result.set_result(message if self.whole else types.SimpleNamespace(status=status, result=message))
-
         def answered(response: Any) -> None:
             sent.set_result(ClientGoalHandle(self, response.accepted, result))
             if response.accepted:
-                wait(self.feedback, heard)
-                wait(self.told if self.whole else self.result, ended)
+                self.follow(call, heard, result.set_result)
 
-        if type(goal) is not self.action.Goal:
-            raise TypeError(f"{goal!r} is no {self.kind}.Goal")
-        wait(self.sent, answered)
-        driven.say(self.goal, goal, call)
+        call = self.send(goal)
+        driven.expect(self.sent, call, answered)
         return sent
 
 

@@ -28,20 +28,8 @@ from .turns import ORDERS, Turns
 REQUEST, RESPONSE = "_Request", "_Response"
 ACTION = ("_Goal", "_Result", "_Feedback")
 """The ends of the names of the message types of a service, and of an action."""
-STATE = (
-    "said",
-    "kept",
-    "latched",
-    "heard",
-    "spoken",
-    "due",
-    "together",
-    "waiting",
-    "dropped",
-    "calls",
-    "taken",
-    "_order",
-)
+STATE: tuple[str, ...] = ("said", "kept", "latched", "heard", "spoken", "due", "together", "waiting", "dropped")
+STATE += ("calls", "taken", "_order")
 """The attributes that loading the file may change, and each run changes."""
 
 
@@ -166,8 +154,9 @@ class Driven(Refusals, Messages, Turns):
         found: list[Any] = []
 
         def end(result: Any) -> None:
-            found.append(result)
-            self.wake(turn)
+            if not found:  # it may end for several reasons
+                found.append(result)
+                self.wake(turn)
 
         begin(end)
         turn.sleep()
@@ -244,10 +233,13 @@ class Driven(Refusals, Messages, Turns):
 
         def send(request: Any, act: Callable[[Any], None]) -> None:
             call = self.new_call()
-            self.waiting[told] = (*self.waiting.get(told, ()), (call, act))
+            self.expect(told, call, act)
             self.say(asked, request, call)
 
         return send
+
+    def expect(self, told: str, call: str, act: Callable[[Any], None]) -> None:
+        self.waiting[told] = (*self.waiting.get(told, ()), (call, act))
 
     def new_call(self) -> str:
         self._order += 1
@@ -280,19 +272,18 @@ class Driven(Refusals, Messages, Turns):
             package, _, called = name.partition("/")
             service = name.removesuffix(REQUEST)
             action = name.rpartition("_")[0]
-            whole = all(f"{action}{end}" in self.classes for end in ACTION) and self.kind == "rclpy"
-            part = "action" if whole else "srv" if name.endswith((REQUEST, RESPONSE)) else "msg"
+            whole = all(f"{action}{end}" in self.classes for end in ACTION)
+            part = "srv" if name.endswith((REQUEST, RESPONSE)) else "msg"
+            part = "action" if whole and self.kind == "rclpy" else part
             content = packages.setdefault(package, {"msg": {}}).setdefault(part, {})
             made.__module__ = f"{package}.{part}"
-            content[called if part == "msg" or self.kind == "rclpy" else called.replace("_", "")] = made
-            if whole and name.endswith(ACTION[0]):
-                parts = {end[1:]: self.classes[f"{action}{end}"] for end in ACTION}
-                content[action.rpartition("/")[2]] = both = type(action.rpartition("/")[2], (), parts)
-                self.services[both] = action
-            if service != name and service + RESPONSE in self.classes:
-                parts = {"Request": made, "Response": self.classes[service + RESPONSE]}
-                content[called.removesuffix(REQUEST)] = both = type(called.removesuffix(REQUEST), (), parts)
-                self.services[both] = service
+            content[called if self.kind == "rclpy" else called.replace("_", "")] = made
+            ends = ACTION if whole and name.endswith(ACTION[0]) else (REQUEST, RESPONSE) if service != name else ()
+            base = action if ends == ACTION else service
+            if ends and all(f"{base}{end}" in self.classes for end in ends):
+                word = base.rpartition("/")[2] + "Action" * (ends == ACTION and self.kind == "rospy")
+                content[word] = both = type(word, (), {end[1:]: self.classes[f"{base}{end}"] for end in ends})
+                self.services[both] = base
         for package, inside in packages.items():
             modules = {part: self.module(f"{package}.{part}", content) for part, content in inside.items()}
             if not self.is_own(package):  # its own `__init__.py` is executed
@@ -339,23 +330,12 @@ def answers(driven: Driven, make: Callable[[Any, Any], Any]) -> Callable[[Any, A
                 wrong += called_from(traceback.extract_tb(error.__traceback__))
             said = list(driven.said)  # without what a callback says when it is cut
             driven.cut()
-            return json.dumps(
-                {
-                    "heard": {topic: kinds[0][0] for topic, kinds in driven.heard.items() if kinds},
-                    "spoken": driven.spoken,
-                    "said": said,
-                    "refused": driven.refused,
-                    "wrong": wrong,
-                    "after": driven.number or len(driven.taken),
-                    "taken": list(driven.taken | dict.fromkeys(range(1, len(asked["events"]) + 1))),
-                    "on": on,
-                    "state": state,
-                    "together": driven.together,
-                    "dropped": driven.dropped,
-                    "order": ORDERS[driven.order],
-                    "calls": [driven.calls.get(number, "") for number in range(len(asked["events"]) + 1)],
-                }
-            )
+            numbers = range(len(asked["events"]) + 1)
+            found = {name: getattr(driven, name) for name in ("spoken", "refused", "together", "dropped")}
+            found |= {"heard": {topic: kinds[0][0] for topic, kinds in driven.heard.items() if kinds}, "said": said}
+            found |= {"wrong": wrong, "on": on, "after": driven.number or len(driven.taken), "state": state}
+            found |= {"taken": list(driven.taken | dict.fromkeys(numbers[1:])), "order": ORDERS[driven.order]}
+            return json.dumps(found | {"calls": [driven.calls.get(number, "") for number in numbers]})
 
         return run
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import enum
+from functools import partialmethod
 from typing import Any, NamedTuple
 
 from .nodes import Node, Publisher
@@ -84,21 +85,6 @@ class LifecycleNode(Node):
             publisher.is_activated = on
         return TransitionCallbackReturn.SUCCESS
 
-    def trigger_configure(self) -> TransitionCallbackReturn:
-        return self._avow_go("configure")
-
-    def trigger_cleanup(self) -> TransitionCallbackReturn:
-        return self._avow_go("cleanup")
-
-    def trigger_activate(self) -> TransitionCallbackReturn:
-        return self._avow_go("activate")
-
-    def trigger_deactivate(self) -> TransitionCallbackReturn:
-        return self._avow_go("deactivate")
-
-    def trigger_shutdown(self) -> TransitionCallbackReturn:
-        return self._avow_go("shutdown")
-
     def _avow_go(self, transition: str) -> TransitionCallbackReturn:
         """A transition, as rclpy makes it; but an exception is raised, and not taken for ERROR."""
         before, after = TRANSITIONS.get(transition, (self._avow_state, "finalized"))
@@ -117,6 +103,12 @@ class LifecycleNode(Node):
         if not isinstance(returned, TransitionCallbackReturn):
             raise TypeError(f"on_{transition} returned {returned!r}, which is no TransitionCallbackReturn")
         return returned
+
+    trigger_configure = partialmethod(_avow_go, "configure")
+    trigger_cleanup = partialmethod(_avow_go, "cleanup")
+    trigger_activate = partialmethod(_avow_go, "activate")
+    trigger_deactivate = partialmethod(_avow_go, "deactivate")
+    trigger_shutdown = partialmethod(_avow_go, "shutdown")
 
     def _avow_activate(self) -> None:
         """As a launch file does before the first message."""

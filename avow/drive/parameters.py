@@ -20,33 +20,32 @@ NEAR = 1e-6
 """rclpy's relative tolerance in ranges of floats."""
 
 
-class ParameterNotDeclaredException(Exception):  # noqa: N818 - rclpy's name, as those below
+class ParameterException(Exception):  # noqa: N818 - rclpy's name, as those below
+    """Something is wrong with a parameter."""
+
+
+class ParameterNotDeclaredException(ParameterException):
     """It is neither declared nor set."""
 
 
-class ParameterAlreadyDeclaredException(Exception):  # noqa: N818
+class ParameterAlreadyDeclaredException(ParameterException):
     """It is declared a second time."""
 
 
-class ParameterUninitializedException(Exception):  # noqa: N818
+class ParameterUninitializedException(ParameterException):
     """It is declared with a type, and has no value."""
 
 
-class InvalidParameterTypeException(Exception):  # noqa: N818
+class InvalidParameterTypeException(ParameterException):
     """Its value is not of the declared type."""
 
 
-class InvalidParameterValueException(Exception):  # noqa: N818
+class InvalidParameterValueException(ParameterException):
     """Its range or a callback rejects the value."""
 
 
-EXCEPTIONS: dict[str, Any] = {
-    kind.__name__: kind
-    for kind in (
-        *(ParameterNotDeclaredException, ParameterAlreadyDeclaredException, ParameterUninitializedException),
-        *(InvalidParameterTypeException, InvalidParameterValueException),
-    )
-}
+EXCEPTIONS: dict[str, Any] = {kind.__name__: kind for kind in ParameterException.__subclasses__()}
+EXCEPTIONS |= {"ParameterException": ParameterException}
 
 
 class Parameter(Strict):

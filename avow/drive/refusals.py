@@ -37,7 +37,6 @@ INSTEAD = {
     "spin_until_future_complete": "call_async and add_done_callback",
     "Client.call": "call_async and add_done_callback",
     "coroutine that waits": "call_async and add_done_callback",
-    "Rate": "Timer",
     "a thread of its own": "a timer",
     ".sleep": "a timer",
     "ament_index_python": "a path beside the file: pathlib.Path(__file__)",

@@ -9,7 +9,7 @@ import sys
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from . import filters
+from . import actionlib, filters
 from .callbacks import REQUEST, RESPONSE, Driven, answers
 from .refusals import Strict, nothing
 from .turns import FREE, SLEEPS
@@ -63,11 +63,19 @@ def modules(spec: Any, own: Sequence[str]) -> Callable[[Any, Any], Callable[[str
 
     filters.Subscriber.subscribe = subscribed
     driven.module("message_filters", filters.CONTENT)
+    driven.module("actionlib", actionlib.CONTENT)
 
     def make(made: Any, params: Any) -> Any:
-        # each subscriber, timer and call has a thread of its own
+        # each subscriber, timer and call has a thread of its own, as has the program
         driven.sleeps = driven.parallel = bool(SLEEPS.search(inspect.getsource(sys.modules[made.__module__])))
-        return made(params) if _takes(made) else made()
+
+        def program() -> None:
+            node = made(params) if _takes(made) else made()
+            if spec["run"]:
+                getattr(node, spec["run"])()
+
+        driven.turn(object(), program)()
+        driven.go_on()
 
     return answers(driven, make)
 
@@ -235,15 +243,9 @@ def _endpoints(driven: Any) -> tuple[Any, ...]:
         _called = "rospy.Subscriber"
 
         def __init__(
-            self,
-            name: str,
-            data_class: Any,
-            callback: Any = None,
-            callback_args: Any = None,
-            queue_size: Any = None,
-            buff_size: int = 65536,
-            tcp_nodelay: bool = False,
-        ) -> None:
+            self, name: str, data_class: Any, callback: Any = None, callback_args: Any = None, queue_size: Any = None,
+            buff_size: int = 65536, tcp_nodelay: bool = False,
+        ) -> None:  # fmt: skip
             extra = () if callback_args is None else (callback_args,)
             act = driven.turn(object(), lambda message: callback(message, *extra) if callback else None)
             driven.hear(name, data_class, act)
@@ -300,6 +302,23 @@ def _endpoints(driven: Any) -> tuple[Any, ...]:
         def close(self) -> None:
             """No effect."""
 
+    class Rate(Strict):
+        _called = "rospy.Rate"
+
+        def __init__(self, hz: float, reset: bool = False) -> None:
+            self.last, self.period = driven.now, int(SECOND / hz)
+
+        def remaining(self) -> Any:
+            return driven.duration.of(self.last + self.period - driven.now)
+
+        def sleep(self) -> None:
+            now, left = driven.now, self.remaining().ns
+            if left > 0:
+                driven.pause(left)
+            self.last += self.period
+            if now - self.last > 2 * self.period:  # its loop is too slow
+                self.last = now
+
     class TimerEvent:
         def __init__(self, before: Any, now: Any) -> None:
             self.last_expected = self.last_real = before
@@ -328,7 +347,7 @@ def _endpoints(driven: Any) -> tuple[Any, ...]:
         def shutdown(self) -> None:
             self.over = True
 
-    return Subscriber, Publisher, Timer, Service, ServiceProxy
+    return Subscriber, Publisher, Timer, Rate, Service, ServiceProxy
 
 
 def _parameters(driven: Any) -> Callable[[str], Any]:

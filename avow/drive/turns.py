@@ -11,7 +11,7 @@ FREE = "no group"
 """In the place of a callback group: tasks of the executor, which belong to none."""
 
 
-SLEEPS = re.compile(r"\bsleep|\btimeout|\bServiceProxy")
+SLEEPS = re.compile(r"\bsleep|\btimeout|\bServiceProxy|\bSimpleAction")
 """What in a file's text may let a callback wait."""
 ORDERS = ("", "the last first", "others before each publication")
 """The orders in which callbacks of one instant run, if the executor has several threads; the first: as they came."""

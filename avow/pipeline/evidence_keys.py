@@ -106,7 +106,7 @@ def surroundings(tool: Backend, job: Job, options: str, files: Iterable[Path] | 
     if tool.uses_source and job.source is not None:
         declared = job.source
         texts = (declared.python, declared.class_name, declared.cpp, declared.parameters, declared.numbers.value)
-        kind = [] if declared.kind is Driving.STEP else [declared.kind.value]
+        kind = [] if declared.kind is Driving.STEP else [declared.kind.value, *declared.run.split()]
         parts.append(["source", *texts, *kind, sorted(declared.memory.items())])
         parts += [repr(sorted(declared.values.items()))] if declared.values else []
         parts += sorted([clause.name, digest(clause.formula)] for clause in job.begins)

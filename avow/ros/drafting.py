@@ -286,13 +286,12 @@ class _Draft:
         lines += self.side("inputs", heard) + self.side("outputs", published)
         topics = [*self.topics(heard, "in"), *self.topics(published, "out")]
         lines.append("  topics(" + ("\n    " + ",\n    ".join(topics) + "\n  )" if topics else " )"))
-        offered = {self.deadline(topic, True, node.name) for topic in published}
-        if len(offered) == 1 and (least := offered.pop()):
-            lines.append(f"  // steps( at most {least} )  as it offers this deadline on all that it publishes")
-        for topic, port in ((topic, self.ports[topic][0]) for topic in heard if self.ports[topic]):
-            if asked := self.deadline(topic, False, node.name):
-                formula = f"( once[{asked}](arrived(in.{port.name})) )"
-                lines.append(f"  // assume alive_{port.name} {formula}  as it requests this deadline of {topic}")
+        if len(offered := {self.deadline(topic, True, node.name) for topic in published}) == 1 and any(offered):
+            lines.append(f"  // steps( at most {offered.pop()} )  as it offers this deadline on all that it publishes")
+        for topic in (t for t in heard if self.ports[t] and self.deadline(t, False, node.name)):
+            name, asked = self.ports[topic][0].name, self.deadline(topic, False, node.name)
+            formula = f"( once[{asked}](arrived(in.{name})) )"
+            lines.append(f"  // assume alive_{name} {formula}  as it requests this deadline of {topic}")
         lines.append('  guarantee to_write "What this node promises is still to be written" ( TRUE )')
         return "\n".join([*lines, "}", ""])
 

@@ -19,7 +19,7 @@ from avow.base.records import dataclass
 from avow.base.suggestions import nearest, suggest
 from avow.language.contract import Node, Topic
 from avow.language.printer import show_number
-from avow.language.terms import And, History, Limit, Past, Role, Term
+from avow.language.terms import And, History, Limit, Past, Role, Term, Variable
 from avow.ros.bags import NoBag
 from avow.ros.calls import OWN_CALLS
 from avow.ros.code import Code, Created, read_code
@@ -115,7 +115,7 @@ def _against_contract(node: Node, placed: Placed, code: Code) -> Iterator[Diagno
         if not plain and name in calls:
             continue  # the request of a call whose response was examined
         calls |= set() if plain else {name}
-        if is_plumbing(name) or kind.partition("/")[0] in OWN_CALLS:
+        if is_plumbing(name) or kind.partition("/")[0] in (*OWN_CALLS, "actionlib_msgs"):
             continue
         mine = [end for whole, end in ends if whole == name and (end.side in _TOPICS) is plain]
         for found, fault in _wrong_type(topic, name, kind, mine):
@@ -259,37 +259,36 @@ def _timed(system: System, ends: Sequence[_End]) -> Iterator[Diagnostic]:
     sooner than a deadline demands them: that of a publisher, or what the node itself requests."""
     said = {entry.port: entry.assume_span for entry in system.plan.environment}
     assumed = environment_assumptions(system, dataflow(system))
+    known = [(end, Fraction(str(end.quality.deadline))) for end in ends if end.quality.deadline not in (None, math.inf)]
     for node in system.contract.nodes:
         placed = system.plan.ros.names.placed(node.name)
         topics = {t.port.variable: placed.resolved(t.name) for t in node.topics if t.port is not None}
-        written = [(clause.formula, clause.span) for clause in node.assumptions]
+        written = [(clause.formula, clause.span) for clause in node.clauses]
         written += [(each.formula, said[each.port]) for each in assumed if each.node == node.name]
-        sooner = [(*found, span) for formula, span in written for found in _arrives(formula)]
-        own = dict.fromkeys(topic for port, topic in topics.items() if port.role is Role.OUTPUT)
-        paces = [(c.pace, c.span) for c in node.guarantees if c.pace is not None]
-        times = [(topic, pace, span, True) for pace, span in paces for topic in own]
-        times += [(topics[port], limit, span, False) for port, limit, span in sooner if port in topics]
-        for topic, limit, span, speaks in times:
-            every = [e for e in ends if e.topic == topic and e.quality.deadline is not None]
-            offers = [e for e in every if e.publishes and (not speaks or e.node in (node.name, ""))]
-            asks = [e for e in every if not e.publishes and (speaks or e.node == node.name)]
-            end = min(offers or asks, key=lambda e: e.quality.deadline or 0, default=None)
-            deadline = Fraction(str(end.quality.deadline)) if end and end.quality.deadline != math.inf else None
-            if end is None or deadline is None or span is None:
-                continue
-            if limit.number > deadline if speaks else limit.number < deadline:
-                length = f"{show_number(limit.number)[0]} s"
-                does = f"may leave {topic} without a message for" if speaks else f"assumes a message on {topic} within"
-                text = f"{node.name} {does} {length}, and its deadline is {show_number(deadline)[0]} s"
-                notes = ((f"it is {'offered' if end.publishes else 'requested'} here", end.span),)
-                yield Diagnostic("ROS137", text, span, Severity.WARNING, "correct one of the times", notes)
+        own = {topic: True for port, topic in topics.items() if port.role is Role.OUTPUT}
+        for port, limit, span in ((*found, span) for formula, span in written for found in _limits(formula)):
+            for topic, speaks in own.items() if port is None else [(topics.get(port), False)]:
+                every = [(end, least) for end, least in known if end.topic == topic]
+                offers = [one for one in every if one[0].publishes and (not speaks or one[0].node in (node.name, ""))]
+                asks = [one for one in every if not one[0].publishes and (speaks or one[0].node == node.name)]
+                end, least = min(offers or asks, key=lambda one: one[1], default=(None, limit.number))
+                if end is not None and (limit.number > least if speaks else limit.number < least):
+                    does = "may leave {} without a message for" if speaks else "assumes a message on {} within"
+                    text = f"{node.name} {does.format(topic)} {show_number(limit.number)[0]} s, and its deadline is"
+                    notes = ((f"it is {'offered' if end.publishes else 'requested'} here", end.span),)
+                    text += f" {show_number(least)[0]} s"
+                    yield Diagnostic("ROS137", text, span, Severity.WARNING, "correct one of the times", notes)
 
 
-def _arrives(formula: Term) -> Iterator[tuple[Term, Limit]]:
-    """The inputs of which a formula demands messages (``once[100 ms](arrived(in.scan))``), and how soon."""
+def _limits(formula: Term) -> Iterator[tuple[Variable | None, Limit]]:
+    """How far apart a formula allows steps (None) to be, and how soon it demands the messages of an input."""
     match formula:
         case And(items=items):
             for item in items:
-                yield from _arrives(item)
-        case History(Past.ONCE, (History(Past.ARRIVED, (port,)),), limit=limit) if limit and not limit.steps:
+                yield from _limits(item)
+        case History(Past.STEPS, limit=limit) if limit:
+            yield None, limit
+        case History(Past.ONCE, (History(Past.ARRIVED, (Variable() as port,)),), limit=limit) if (
+            limit and not limit.steps
+        ):
             yield port, limit

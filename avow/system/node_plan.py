@@ -105,6 +105,7 @@ def read_source(name: str, node: Piece) -> tuple[Source | None, tuple[Diagnostic
         node.located(),
         Driving(texts.get("kind", "step")),
         {name: part.value for name, _, part in node.keyed("parameters")},
+        texts.get("run", ""),
     )
     return found, tuple(faults)
 

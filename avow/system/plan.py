@@ -214,6 +214,8 @@ class Source:
     kind: Driving = Driving.STEP
     values: Mapping[str, Any] = field(default_factory=dict)
     """The parameters that the plan itself sets for the node."""
+    run: str = ""
+    """The method that the program calls on its node of rospy, such as its loop."""
 
 
 @dataclass(frozen=True, slots=True)

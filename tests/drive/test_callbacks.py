@@ -175,13 +175,13 @@ def test_a_class_has_the_parameters_that_ros2_reads(tmp_path: Path, parameters: 
 
 CAUGHT = {
     "rospy.wait_for_message('r', Float64)": "rospy.wait_for_message",
-    "import actionlib as _": "the module actionlib",
-    "hasattr(rospy, 'Rate')": "rospy.Rate",
+    "import actionlib.action_server as _": "the module actionlib.action_server",
+    "hasattr(rospy, 'SubscribeListener')": "rospy.SubscribeListener",
     "self.said.get_num_connections()": "rospy.Publisher.get_num_connections",
     "import tf as _": "the module tf",
     "import rospy.core as _": "the module rospy.core",
     "import nav_msgs.msg as _": "the module nav_msgs",
-    "from rospy import Rate as _": "rospy.Rate",
+    "from rospy import AnyMsg as _": "rospy.AnyMsg",
 }
 
 
@@ -441,7 +441,7 @@ def test_a_callback_that_takes_no_message_is_told_at_its_line(tmp_path: Path) ->
 
 LOADED = [  # the first line of the file, and what is told if it cannot be loaded
     ("from .helper import x", "no known parent package (watch.py, line 1); a relative import needs the file in the"),
-    ("from rospy import Rate", "Rate is not driven; instead: Timer (watch.py, line 1)"),
+    ("from rospy import AnyMsg", "rospy.AnyMsg is not driven (watch.py, line 1)"),
     (
         "import no_such_module",
         "'no_such_module': install it where Avow runs, or put its file beside watch.py (watch.py",

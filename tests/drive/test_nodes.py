@@ -8,14 +8,17 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 import pytest
 from helpers import avow, edit
 
 from avow.backend_kit import one_step
+from avow.backend_kit.programs.callbacks import SECOND, Event, driver
 from avow.backend_kit.protocol import Limits
 from avow.base.verdict import Outcome, Verdict
 from avow.pipeline.methods import method_job
+from avow.pipeline.plan_check import diagnostics
 from avow.system.load import load_system
 from drive.test_callbacks import drive
 
@@ -34,15 +37,18 @@ class Made:
     mapping: str = "{}"
     kind: str = "rclpy"
     cases: str = "300"
+    run: str = ""
 
 
 def system(folder: Path, made: Made) -> Path:
     for path, text in {**made.files, "params.yaml": made.params or "{}\n", "system.rcl": made.contract}.items():
         (folder / path).parent.mkdir(parents=True, exist_ok=True)
         (folder / path).write_text(text, encoding="utf-8")
+    run = made.run and f", run: {made.run}"
+    source = f"python: {next(iter(made.files))}, class: Watch, kind: {made.kind}, parameters: params.yaml{run}"
     (folder / "plan.yaml").write_text(
         "system: w\ncontract: system.rcl\nros: {distro: humble}\nnodes:\n  watch:\n"
-        f"    source: {{python: {next(iter(made.files))}, class: Watch, kind: {made.kind}, parameters: params.yaml}}\n"
+        f"    source: {{{source}}}\n"
         f"    mapping: {made.mapping}\n    methods: [hypothesis: {{cases: {made.cases}}}]\n{made.options}",
         encoding="utf-8",
     )
@@ -643,6 +649,128 @@ class Watch(Node):
         made.transform.rotation = message.pose.pose.orientation
         self.broadcaster.sendTransform(made)
 """
+LOOP1 = """\
+import rospy
+from std_msgs.msg import Float64
+
+
+class Watch:
+    def __init__(self):
+        self.asked = None
+        self.allowed = rospy.Publisher("allowed", Float64, queue_size=10)
+        rospy.Subscriber("asked", Float64, self.heard)
+
+    def heard(self, message):
+        self.asked = message.data
+
+    def loop(self):
+        rate = rospy.Rate(20)
+        while not rospy.is_shutdown():
+            if self.asked is not None:
+                self.allowed.publish(min(1.5, self.asked))
+            rate.sleep()
+
+
+if __name__ == "__main__":
+    rospy.init_node("watch")
+    Watch().loop()
+"""
+SPIN1 = """\
+import actionlib
+import rospy
+from mover.msg import SpinAction, SpinFeedback, SpinResult
+
+
+class Watch:
+    def __init__(self):
+        self.server = actionlib.SimpleActionServer("spin", SpinAction, execute_cb=self.spin, auto_start=False)
+        self.server.register_preempt_callback(lambda: rospy.loginfo("another goal"))
+        self.server.start()
+
+    def spin(self, goal):
+        rate = rospy.Rate(4)
+        done = 0
+        while done < min(goal.turns, 3):
+            if self.server.is_preempt_requested():
+                self.server.set_preempted(SpinResult(done))
+                return
+            done += 1
+            self.server.publish_feedback(SpinFeedback(sofar=done))
+            rate.sleep()
+        if goal.turns > 3:
+            self.server.set_aborted(SpinResult(done=done), "too far")
+        else:
+            self.server.set_succeeded(SpinResult(done=done))
+"""
+SPUN1 = """\
+node watch {
+  inputs( turns : INTEGER )
+  outputs( done : INTEGER, sofar : INTEGER, status, ended : INTEGER )
+  topics( mover/Spin_Goal spin matches(in.turns), mover/Spin_Result spin matches(out.done),
+          mover/Spin_Feedback spin matches(out.sofar), actionlib_msgs/GoalID spin/cancel,
+          mover/Spin_GetResult_Response spin/_action/get_result matches(out.status),
+          mover/Spin_GetResult_Response spin/_action/get_result matches(out.ended) )
+  guarantee most ( out.done <= 3 )
+  guarantee going ( 1 <= out.sofar and out.sofar <= 3 )
+  guarantee whole ( out.status == 3 -> out.ended == max(in.turns, 0) )
+  guarantee short ( out.status == 4 -> in.turns > 3 )
+  guarantee stopped ( out.status != 3 and out.status != 4 -> out.status == 2 or (out.status == 8 and out.ended == 0) )
+}
+"""
+ORDERS1 = """\
+import actionlib
+import rospy
+from mover.msg import SpinAction, SpinGoal
+from std_msgs.msg import Bool, Int32
+
+
+class Watch:
+    def __init__(self):
+        self.shown = rospy.Publisher("shown", Int32, queue_size=10)
+        self.near = rospy.Publisher("near", Bool, queue_size=10)
+        self.client = actionlib.SimpleActionClient("spin", SpinAction)
+        self.client.wait_for_server()
+        rospy.Subscriber("turns", Int32, self.heard)
+
+    def heard(self, message):
+        self.client.send_goal(SpinGoal(min(message.data, 3)), done_cb=self.ended, feedback_cb=self.going)
+
+    def going(self, feedback):
+        self.near.publish(feedback.sofar >= 2)
+
+    def ended(self, status, result):
+        if status == actionlib.GoalStatus.SUCCEEDED:
+            self.shown.publish(result.done)
+"""
+WAITS1 = """\
+import actionlib
+import rospy
+from mover.msg import SpinAction, SpinGoal
+from std_msgs.msg import Int32
+
+
+class Watch:
+    def __init__(self):
+        self.shown = rospy.Publisher("shown", Int32, queue_size=10)
+        self.client = actionlib.SimpleActionClient("spin", SpinAction)
+        rospy.Subscriber("turns", Int32, self.heard)
+
+    def heard(self, message):
+        self.client.send_goal(SpinGoal(turns=min(message.data, 3)))
+        came = self.client.wait_for_result(rospy.Duration(2.0))
+        self.shown.publish(self.client.get_result().done if came else -1)
+"""
+SPUN2 = """\
+node watch {
+  inputs( turns : INTEGER, done : INTEGER )
+  outputs( asked : INTEGER, shown : INTEGER )
+  topics( int32 turns matches(in.turns), mover/Spin_Goal spin matches(out.asked),
+          mover/Spin_Result spin matches(in.done), int32 shown matches(out.shown) )
+  assume even ( mod(in.done, 2) == 0 )
+  guarantee bounded ( out.asked <= 3 )
+  guarantee shown ( mod(out.shown, 2) == 0 or out.shown == -1 )
+}
+"""
 SPINS = {"mover/package.xml": PACKAGE["ws/src/mover/package.xml"]}
 SPINS |= {"mover/action/Spin.action": "int32 turns\n---\nint32 done\n---\nint32 sofar\n"}
 RANGES = "{in.left: range, in.right: range}"
@@ -706,6 +834,47 @@ NODES = {
         {"mover/mover/client.py": ORDERS, **SPINS},
         (("min(message.data, 3)", "message.data"), ("result.done", "result.done + 1"), (">= 2", ">= 1")),
         mapping="{in.taken: accepted}",
+        options="messages: [mover/action]\n",
+        cases="900",
+    ),
+    "a loop at a rate of ROS 1": Made(
+        re.sub(".*followed.*\n", "", LIMIT),
+        {"src/loop.py": LOOP1},
+        (("min(1.5", "max(1.5"), ("min(1.5", "min(2.5")),
+        kind="rospy",
+        run="loop",
+    ),
+    "a server of an action of ROS 1": Made(
+        SPUN1,
+        {"mover/src/server.py": SPIN1, **SPINS},
+        (
+            ("min(goal.turns, 3)", "min(goal.turns, 4)"),
+            ("sofar=done)", "sofar=done - 1)"),
+            ("goal.turns > 3", "goal.turns > 2"),
+            ("set_preempted(SpinResult(done))", "set_succeeded(SpinResult(done))"),
+        ),
+        mapping="{out.status: status, out.ended: result.done}",
+        kind="rospy",
+        options="messages: [mover/action]\n",
+        cases="900, answers: {by: call}",
+    ),
+    "a client of an action of ROS 1": Made(
+        re.sub(".*_SendGoal_Response.*\n", "", SPUN.replace("taken : BOOL, ", "")),
+        {"mover/src/client.py": ORDERS1, **SPINS},
+        (("min(message.data, 3)", "message.data"), ("result.done", "result.done + 1"), (">= 2", ">= 1")),
+        kind="rospy",
+        options="messages: [mover/action]\n",
+        cases="900",
+    ),
+    "a client that waits for a result of ROS 1": Made(
+        SPUN2,
+        {"mover/src/client.py": WAITS1, **SPINS},
+        (
+            ("get_result().done", "get_result().done + 1"),
+            ("if came", "if not came"),
+            ("message.data, 3)", "message.data, 4)"),
+        ),
+        kind="rospy",
         options="messages: [mover/action]\n",
         cases="900",
     ),
@@ -776,6 +945,13 @@ def test_a_node_is_driven_and_its_mutants_are_caught(tmp_path: Path, name: str) 
         assert files != made.files, old
         wrong = verdicts(system(tmp_path / str(number), replace(made, files=files)))
         assert {o.verdict for o in wrong.values()} != {Verdict.TESTED}, (old, new)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", NODES)
+def test_the_check_finds_no_fault_in_a_node_that_is_driven(tmp_path: Path, name: str) -> None:
+    found = {d.code for d in diagnostics(load_system(system(tmp_path, NODES[name])))}
+    assert not {code for code in found if code[:3] != "RCL"} - {"ROS132", "ROS134"}  # a topic without a guarantee
 
 
 TREE = """
@@ -891,3 +1067,67 @@ def test_what_a_node_may_not_do_is_told(tmp_path: Path, name: str) -> None:
     done = drive(system(tmp_path / "w", made), "watch")
     told = " ".join(d.message for d in done.exception.diagnostics) if done.exception else done.output
     assert why in told
+
+
+def driven(folder: Path, made: Made, *given: tuple[str, float, dict[str, Any]]) -> list[tuple[str, float, Any]]:
+    """What is published on these messages (topic, seconds, fields), with its seconds and its fields by the contract."""
+    found = driver(load_system(system(folder, made)), "watch")
+    events = [Event(topic, round(at * SECOND), found.coded(topic, fields, "")) for topic, at, fields in given]
+    run = found.run(events, 0, 3 * SECOND)
+    assert not run.wrong, run.wrong
+    return [(e.topic, e.at / SECOND, {k: v for k, v in found.fields(e).items() if k[0] != "_"}) for e in run.said]
+
+
+@pytest.mark.parametrize("place", ["__init__", "loop"])
+def test_a_rate_is_that_of_rospy(tmp_path: Path, place: str) -> None:
+    """Also in the constructor; a sleep within the loop counts, and a loop that is too slow begins anew."""
+    made = NODES["a loop at a rate of ROS 1"]
+    text = made.files["src/loop.py"].replace("Rate(20)", "Rate(4)")
+    text = text.replace("1.5, self.asked))", "9.0, self.asked))\n                rospy.sleep(max(0.0, self.asked))")
+    if place == "__init__":
+        text = text.replace("self.heard)\n", "self.heard)\n        self.loop()\n", 1)
+        made = replace(made, run="")
+    made = replace(made, files={"src/loop.py": text})
+    said = driven(
+        tmp_path, made, ("/asked", 0.1, {"data": 0.2}), ("/asked", 0.8, {"data": 0.7}), ("/asked", 1.8, {"data": 0.1})
+    )
+    times = [round(at, 2) for _, at, _ in said]
+    assert times == [0.25, 0.5, 0.75, 1.0, 1.7, 2.4, 2.65, 2.9]
+
+
+GOAL, RESULT, CANCEL = "/spin/_goal", "/spin/_result", "/spin/cancel"
+TOLD = "/spin/_action/get_result/_response"
+
+
+@pytest.mark.parametrize(
+    ("given", "wanted"),
+    [
+        ([(GOAL, 0, 2)], [(0.5, 3, 2)]),
+        ([(GOAL, 0, 4)], [(0.75, 4, 3)]),
+        ([(GOAL, 0, 0)], [(0.0, 3, 0)]),
+        ([(GOAL, 0, 3), (GOAL, 0.3, 1)], [(0.5, 2, 2), (0.85, 3, 1)]),  # another goal; the thread looks after 0.1 s
+        ([(GOAL, 0, 3), (GOAL, 0.3, 2), (GOAL, 0.4, 1)], [(0.4, 8, 0), (0.5, 2, 2), (0.85, 3, 1)]),
+        ([(GOAL, 0, 3), (CANCEL, 0.3, {})], [(0.5, 2, 2)]),
+        ([(GOAL, 0, 3), (CANCEL, 0.3, {"id": "1"})], [(0.5, 2, 2)]),
+        ([(GOAL, 0, 3), (CANCEL, 0.3, {"id": "other"})], [(0.75, 3, 3)]),
+        ([(GOAL, 0.1, 3), (CANCEL, 0.3, {"stamp": {"secs": 0, "nsecs": 10**8}})], [(0.35, 2, 1)]),
+        ([(GOAL, 0.2, 3), (CANCEL, 0.3, {"stamp": {"secs": 0, "nsecs": 10**8}})], [(0.95, 3, 3)]),
+        ([(GOAL, 0, 3), (GOAL, 0.3, 2), (CANCEL, 0.4, {"id": "2"})], [(0.5, 2, 2), (0.6, 2, 0)]),  # before it began
+    ],
+)
+@pytest.mark.slow
+def test_goals_go_through_the_states_of_actionlib(
+    tmp_path: Path, given: list[tuple[str, float, Any]], wanted: list[tuple[float, int, int]]
+) -> None:
+    events = [(topic, at, {"turns": what} if topic == GOAL else what) for topic, at, what in given]
+    said = driven(tmp_path, NODES["a server of an action of ROS 1"], *events)
+    told = [(at, fields["status"], fields["result"]["done"]) for topic, at, fields in said if topic == TOLD]
+    assert told == wanted
+    assert [fields["done"] for topic, _, fields in said if topic == RESULT] == [done for _, _, done in wanted]
+
+
+def test_a_method_to_run_has_to_be_there(tmp_path: Path) -> None:
+    made = replace(NODES["a loop at a rate of ROS 1"], run="loops")
+    done = drive(system(tmp_path / "w", made), "watch")
+    assert done.exception is not None
+    assert "did you mean Watch.loop?" in str(done.exception.diagnostics)

@@ -130,6 +130,8 @@ def test_a_name_that_nothing_defines(tmp_path: Path) -> None:
     ("imported", "said"),
     [
         ("from own.msg import Laod", [("DRIVE107", "did you mean `Load`?")]),
+        ("from own.msg import SpinAction, SpinGoal", []),
+        ("from own.msg import SpinGaol", [("DRIVE107", "did you mean `SpinGoal`?")]),
         ("from std_msgs.msg import Flot64", [("DRIVE107", "did you mean `Float64`?")]),
         ("from own.msg import Load as L, Box", []),
         ("from other.msg import Anything", []),
@@ -147,6 +149,7 @@ def test_a_message_that_its_package_does_not_have(tmp_path: Path, imported: str,
     (tmp_path / "msg/own/srv/Set.srv").write_text("bool on\n---\nbool done\n", "utf-8")
     (tmp_path / "msg/own/action").mkdir()
     (tmp_path / "msg/own/action/Turn.action").write_text("bool on\n---\nbool done\n---\nbool now\n", "utf-8")
+    (tmp_path / "msg/own/action/Spin.action").write_text("---\n---\n", "utf-8")
     (tmp_path / "system.rcl").write_text(CONTRACT, "utf-8")
     (tmp_path / "a.py").write_text(f"{imported}\n\n\nclass A:\n    pass\n", "utf-8")
     plan = "messages: [msg]\nros: {distro: humble}\nnodes: {a: {source: {python: a.py, class: A}, methods: []}}\n"

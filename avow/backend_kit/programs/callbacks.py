@@ -231,6 +231,7 @@ def driver(system: System, name: str) -> Driver:
     package = next((folder for folder in folders if (folder / "package.xml").is_file()), path.parent)
     ros = {
         "kind": source.kind.value,
+        "run": source.run,
         "name": placed.name,
         "remaps": [list(pair) for pair in placed.remaps],
         "most": DRIVEN_CALLBACKS,

@@ -87,20 +87,8 @@ def pool(numbers: Iterable[Fraction]) -> Pool:
     return Pool(floats, tuple(sorted(doubles | {0.0})), ints, lengths)
 
 
-EXTREME = (
-    -0.0,
-    5e-324,
-    -5e-324,
-    sys.float_info.min,
-    1e-300,
-    1e-17,
-    1e15,
-    2.0**53,
-    1e300,
-    sys.float_info.max,
-    -sys.float_info.max,
-    -1e300,
-)
+EXTREME: tuple[float, ...] = (-0.0, 5e-324, -5e-324, sys.float_info.min, 1e-300, 1e-17, 1e15, 2.0**53)
+EXTREME += (1e300, sys.float_info.max, -sys.float_info.max, -1e300)
 
 
 @dataclass(slots=True)
