@@ -263,12 +263,13 @@ def _says(facts: Facts, match: re.Match[str], block: Block) -> _Numbers:
 
 
 def _accepted(facts: Facts, match: re.Match[str], _block: Block) -> _Numbers:
-    """An assumption's words, and its owner with the first and the last day."""
+    """An assumption's words, and if its owner or end is missing or past, who and until when."""
     a = next((a for a in facts.assumptions if a["number"] == f"A{match[1]}"), facts.assumptions[0])
     last = "until a text changes" if a["sort"] == "meaning" and a["who"] else "no last day"
     last = f"{'expired' if a['expired'] else 'until'} {a['until']}" if a["until"] else last
     term = ", ".join(part for part in (a["who"] or "no owner", a.get("date", ""), last) if part)
-    return a["number"][1:], *(" ".join(text.split()) for text in (a["says"] or a["text"], term))
+    bad = a["expired"] or a not in facts.owned_ones()
+    return a["number"][1:], *(" ".join(text.split()) for text in (a["says"] or a["text"], term * bad))
 
 
 def _place(facts: Facts, match: re.Match[str], _block: Block) -> _Numbers:
@@ -390,7 +391,7 @@ RULES = (
     _rule("q4", r"(\d+) needed by no requirement", _whole(lambda f: sum(not a["needed_by"] for a in f.assumptions))),
     _rule("q4", rf"assumed since {_DAY}(?: to {_DAY})?", _days),
     _rule("q4", rf"(?:until|the first ends) {_DAY}", _days),
-    _rule("assumptions", r"^ ␟ A(\d+) ␟ (.*) ␟ (.*?) $", _accepted),
+    _rule("assumptions", r"^ ␟ A(\d+) ␟ (.*) ␟ ?(.*?) $", _accepted),
     _rule("q4", r"\bA(\d+)(?= )", _says),
     _rule("q4", r"under (assumptions\.[\w-]+)\.WORD", _place),
     _rule("q5", r" all (\d+)(?= $)", _whole(lambda f: len(f.changes))),
@@ -429,7 +430,7 @@ RULES = (
     _rule("head", r"git HEAD (\d+)(?=,)", lambda f, _m, _b: (str(f.case["run"].get("revision")),)),
     _rule("head", r"ledger (\d+)(?=,)", lambda f, _m, _b: (str(f.case["ledger_head"]),)),
     _rule("gates", r"\(([^()]*\d[^()]*)\)(?=: )", _policy),
-    _rule("hazards", r"^ ␟ (.*?) ␟ (.*?)(?: \(security\))? ␟ .*? ␟ .*? weakest: (.*?); (.*?) ␟ ", _hazard),
+    _rule("hazards", r"^ ␟ (.*?) ␟ (.*?)(?: \(security\))? ␟ .*? ␟ .*? weakest: (.*?); (.*?) $", _hazard),
     _rule("standard", r"(\d+) (served|partly served|open|outside)\b", _objectives),
 )
 

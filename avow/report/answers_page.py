@@ -64,6 +64,7 @@ def render_answers(case: Case, json_digest: str = "") -> str:
         many=_many(case),
         refuted=_refuted,
         some=listed,
+        worded={line.number for line in case.answers.supposed},
         tone_of_level={level: _tone_of(case, level) for level in Level},
     )
 

@@ -240,15 +240,19 @@ def test_words_that_differ_are_told() -> None:
 
 
 def test_what_a_signature_accepts_stands_in_words_on_the_page_that_is_signed() -> None:
-    """On screen, on paper, and however many assumptions there are."""
+    """On screen, on paper, and however many assumptions there are: in box 4, or below the signature."""
     found = rover_case()
     one = found.assumptions[0]
     many = tuple(replace(one, number=f"A{at}", says=f"It is so, {at}", who="") for at in range(1, 40))
-    full = replace(found, assumptions=many)
+    line = replace(found.answers.supposed[0], number="A7", says="It is so, 7")
+    full = replace(found, assumptions=many, answers=replace(found.answers, supposed=(line,)))
     page = " ".join(re.sub(r"<[^>]*>", " ", render_answers(full)).split())
-    accepted = page.partition("What a signature accepts")[2].partition("Hazards")[0]
-    assert [accepted.count(f"A{at} It is so, {at} no owner, ") for at in range(1, 40)] == [1] * 39
-    assert "listed in words below: assumptions , deficits ." in page
+    accepted = page.partition("that a signature accepts")[2].partition("Hazards")[0]
+    assert [accepted.count(f"A{at} It is so, {at} ◐ no owner, ") for at in range(1, 40)] == [
+        int(n != 7) for n in range(1, 40)
+    ]
+    assert page.count("A7 It is so, 7") == 1
+    assert "All is in words above or below: assumptions , deficits ." in page
 
 
 def test_counts_that_differ_are_told() -> None:

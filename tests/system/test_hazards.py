@@ -180,7 +180,7 @@ def test_a_security_goal_rests_on_who_feeds_an_input(tmp_path: Path) -> None:
         "S2: {text: A stranger sends readings, severity: critical, kind: security, mitigated_by: [n.r]}\n"
     )
     found = case(secured(tmp_path, SECURE.replace("guarantee r (", "guarantee low ("), goals), [], [])
-    ordered, read = found.hazards
+    read, ordered = found.hazards  # the least mitigated first
     assert (ordered.level, read.level) == (Level.ARGUED, Level.NOT_SHOWN)
     assert ordered.mitigations[0].words == "in the graph only remote reaches n.order"
     (gate,) = [gate for gate in found.gates if gate.id == "hazards"]
