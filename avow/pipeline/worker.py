@@ -203,8 +203,8 @@ def remarked(report: Report, found: Iterable[Diagnostic], job: Job) -> Report:
 
 
 def _place(span: Span | None, root: Path) -> str:
-    """``models/p.imp:2``: the same on any machine."""
-    if span is None:
+    """``models/p.imp:2``: the same on any machine; empty for an option, whose place in the plan a job does not know."""
+    if span is None or not span.file:
         return ""
     path = Path(span.file)
     return f"{path.relative_to(root).as_posix() if path.is_relative_to(root) else path.name}:{span.line}"

@@ -12,7 +12,7 @@ from avow.backend_kit.protocol import Job, Limits, Report
 from avow.backend_kit.stepping import Stepping
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.persons import unreadable, wrong_day
-from avow.base.plain import is_blank
+from avow.base.plain import count, is_blank
 from avow.base.records import dataclass
 from avow.base.verdict import Counterexample, Link, Outcome, Verdict
 from avow.evaluation.evaluate import NotEvaluable, evaluate
@@ -215,8 +215,8 @@ def _obligation(
         summary = f"{worst.triple.name}: {worst.why}"
         return Outcome(obligation.id, worst.verdict, summary, shown, link=link, details=details)
     vacuous = bool(settled) and all(s.vacuous for s in settled)
-    count = sum(s.conditions for s in settled)
-    summary = f"{len(settled)} Hoare triple(s) proved: {count} verification condition(s)"
+    conditions = count(sum(s.conditions for s in settled), "verification condition")
+    summary = f"{count(len(settled), 'Hoare triple')} proved: {conditions}"
     if vacuous:
         summary += f"; but {settled[0].vacuous}"
     endings = _termination(work)

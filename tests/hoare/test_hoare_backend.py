@@ -93,6 +93,7 @@ def test_the_sensor_is_proved(tmp_path: Path) -> None:
         outcome = found[name]
         assert (outcome.verdict, outcome.vacuous, outcome.link) == (Verdict.PROVED, False, Link.GENERATED)
     assert not any(o.hypotheses for o in found.values())
+    assert found["low"].summary.startswith("1 Hoare triple proved: 1 verification condition")
 
 
 @pytest.mark.parametrize(

@@ -31,10 +31,14 @@ def test_warnings_stand_beside_the_answer(tmp_path: Path, off: str) -> None:
     warning = Diagnostic("HOARE410", "the program compares with 10", place, Severity.WARNING)
     note = Diagnostic("X1", "a note", None, Severity.NOTE)
     elsewhere = Diagnostic("X2", "elsewhere", Span("/elsewhere/q.imp", 3, 1, 3, 2), Severity.WARNING)
-    found = remarked(ANSWER, [warning, note, warning, elsewhere], job)
+    option = Diagnostic(
+        "X3", "an option", Span("", 1, 1, 1, 2), Severity.WARNING
+    )  # a job does not know the plan's text
+    found = remarked(ANSWER, [warning, note, warning, elsewhere, option], job)
     told = [
         {"code": "HOARE410", "place": "p.imp:2", "message": "the program compares with 10"},
         {"code": "X2", "place": "q.imp:3", "message": "elsewhere"},
+        {"code": "X3", "place": "", "message": "an option"},
     ]
     (outcome,) = found.outcomes
     assert outcome.details == {"outline": "…", "remarks": told[1:] if off else told}
