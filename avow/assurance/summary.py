@@ -108,10 +108,9 @@ def open_items(
 
 def _used(accepted: Handled, views: Sequence[ObligationView]) -> bool:
     """Whether evidence rests on an assumption that is accepted, or may once a method of its node has run."""
-    own = [view for view in views if accepted.pattern.startswith(f"{view.obligation.node}/assumption/")]
-    supposed = [h for view in own for record in view.records for h in record.rests_on]
-    missing = any(record.verdict is Verdict.NOT_RUN for view in own for record in view.records)
-    return missing or any(accepts(accepted.pattern, accepted.found, h) for h in supposed)
+    own = [r for v in views if accepted.pattern.startswith(f"{v.obligation.node}/assumption/") for r in v.records]
+    supposed = any(accepts(accepted.pattern, accepted.found, h) for r in own for h in r.rests_on)
+    return supposed or any(r.verdict is Verdict.NOT_RUN for r in own)
 
 
 def _failed_attempts(views: Sequence[ObligationView]) -> Iterable[OpenItem]:

@@ -42,8 +42,7 @@ def read_box(
     for name, entry in entries.items():
         try:
             if name not in known:
-                message = f"'{name}' is none of the inputs of type REAL: {', '.join(known)}"
-                raise Rejected(Diagnostic(code, message, span, hint=suggest(name, known)))
+                raise Rejected(Diagnostic(code, f"'{name}' is no input of type REAL", span, hint=suggest(name, known)))
             low, high = _ends(name, entry, root, code, span)
             if low > high:
                 raise Rejected(Diagnostic(code, f"{name} is an interval without values", span))

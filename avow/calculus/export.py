@@ -81,10 +81,14 @@ def derived_contract(composition: Composition, goal: Goal) -> Contract:
             label = re.sub(r"\W", "_", f"environment_{assumed.port}")
             blank = Clause(ClauseKind.ASSUMPTION, label, 0, term, assumed.because or None)
             assumptions.append(_clause(names, ClauseKind.ASSUMPTION, label, blank, term, len(assumptions)))
-    guarantees = [
-        _clause(names, ClauseKind.GUARANTEE, f"{node}_{clause.name}", clause, frame.clause(node, clause.name), k)
-        for k, (node, clause) in enumerate((n, c) for n in nodes for c in frame.node(n).guarantees)
-    ]
+
+    def promised(node: str, clause: Clause, position: int) -> Clause:
+        term, mapping = frame.clause(node, clause.name), frame.mapping(node)
+        made = _clause(names, ClauseKind.GUARANTEE, f"{node}_{clause.name}", clause, term, position)
+        over = lambda formula: names.rename(substitute(formula, mapping))  # noqa: E731
+        return replace(made, chance=clause.chance and clause.chance.mapped(over))
+
+    guarantees = [promised(n, c, k) for k, (n, c) in enumerate((n, c) for n in nodes for c in frame.node(n).guarantees)]
     label = re.sub(r"\W", "_", goal.name if goal is not composition.whole else frame.system.name)
     whole = Node(label, tuple(inputs.values()), tuple(outputs.values()), (), tuple(assumptions), tuple(guarantees))
     return replace(frame.system.contract, files=(), nodes=(whole,))

@@ -160,7 +160,7 @@ def composed_node(frame: Frame, goal: Goal, face: Face, formulas: Reply) -> tupl
     lines += [f"  reads {', '.join(port.name for port in face.node.inputs)}"] if face.node.inputs else []
     lines += [f"  puts out {', '.join(port.name for port in node.outputs)}"] if node.outputs else []
     for verb, these in (("assumes", node.assumptions), ("guarantees", node.guarantees)):
-        for clause in these:
+        for clause in (c for c in these if c.chance is None):  # a probability stays the node's
             formula = substitute(formulas[ClauseName(node.name, clause.name)], ports)
             lines.append(f"  {verb} {clause.name}: {show_term(formula)}")
     return node, tuple(lines)

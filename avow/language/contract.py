@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import field
+from collections.abc import Callable
+from dataclasses import field, replace
 from enum import StrEnum
 from fractions import Fraction
 from typing import Any
@@ -38,6 +39,10 @@ class Chance:
     def always(self) -> Term:
         """What a step does that keeps the guarantee."""
         return self.claim if self.given == TRUE else Implies(self.given, self.claim)
+
+    def mapped(self, change: Callable[[Term], Term]) -> Chance:
+        """With other formulas."""
+        return replace(self, claim=change(self.claim), given=change(self.given))
 
 
 @dataclass(frozen=True, slots=True)

@@ -106,6 +106,7 @@ def to_smtlib(contract: Contract) -> Partial:
     for node in contract.nodes:
         compiled = compile_node(node)
         refused = {name: f"it speaks of {unsaid.reason}" for name, unsaid in compiled.unsaid.items()}
+        refused |= {c.name: "it has a probability" for c in node.guarantees if c.chance}
         formulas = {c.name: c.formula for c in compiled.node.clauses if c.name not in refused}
         comment = ""
         for cell in compiled.cells:

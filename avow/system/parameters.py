@@ -187,7 +187,7 @@ def with_values(
         return expand(body, [values[v] for v in spoken], term.span) if spoken else term
 
     def clause(old: Clause) -> Clause:
-        chance = old.chance and replace(old.chance, claim=put(old.chance.claim), given=put(old.chance.given))
+        chance = old.chance and old.chance.mapped(put)
         written = None if old.written is None else put(old.written)
         return replace(old, formula=put(old.formula), written=written, chance=chance)
 

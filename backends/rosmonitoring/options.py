@@ -83,12 +83,11 @@ class Setup:
         by, output = publisher(event), name.startswith(f"{Role.OUTPUT}.")
         if (concerned := concerns(self.rules[name], event)) is not None:
             return concerned
-        if by == FALLBACK and output:
-            return False
         if name in self.shared:
             return by == self.placed if by in self.shared[name] else None
-        guarded = same_topic(self.carried[name].topic) in self.filtered
-        return None if self.strange(by) and output and not guarded else True
+        if output and same_topic(self.carried[name].topic) in self.filtered:
+            return by != FALLBACK
+        return None if self.strange(by) and output else True
 
     def strange(self, by: str) -> bool:
         """Whether this is the name of a node, and not of this one."""

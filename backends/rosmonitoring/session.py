@@ -75,8 +75,8 @@ def filtered(setups: Iterable[Setup]) -> frozenset[str]:
 
 def outside(monitor: Monitor) -> bool:
     """Whether the node's inputs are not known to be in the plan's box."""
-    found = (w for w in monitor.assumptions if w.clause.name == BOX and monitor.setup.box.terms)
-    return any(not monitor.values.keys() >= {*w.names} or w.truth_of(monitor.values) is not True for w in found)
+    found = [w for w in monitor.assumptions if monitor.setup.box.terms and w.clause.name == BOX]
+    return any(not (monitor.values.keys() >= {*w.names} and w.truth_of(monitor.values)) for w in found)
 
 
 def _report_withheld(monitors: Iterable[Monitor], counts: Mapping[str, int]) -> None:

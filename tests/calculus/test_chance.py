@@ -9,15 +9,18 @@ from fractions import Fraction
 from pathlib import Path
 
 import pytest
+from helpers import avow
 
 from avow.base.diagnostics import Rejected
 from avow.base.verdict import HypothesisKind, Outcome, Verdict
 from avow.calculus.composition import compose
+from avow.calculus.export import derived_contract
 from avow.calculus.required import unshown
 from avow.evidence.record import LIKELY_LEAVES
 from avow.kernel.check import Refused
 from avow.kernel.rates import Leaf, Likely, Trial, composed, together
 from avow.language.load import check_text
+from avow.language.translate import to_rcl
 from avow.system.plan import System
 from calculus.make import make, outcomes
 
@@ -174,3 +177,20 @@ def test_a_claim_without_a_sample_has_its_stated_bound() -> None:
         composed([Leaf("a", (), "0.01"), Leaf("b", (), "0.02", Trial.RUN)], at_once=True)
     with pytest.raises(Refused):
         composed([Leaf("a", (), "-0.01")], at_once=True)
+
+
+def test_the_derived_contract_has_the_probabilities(tmp_path: Path) -> None:
+    """As a node has them, over the ports of the whole; a subsystem's contract in words leaves them to the node."""
+    system = made(tmp_path / "one", STOPS, "0.99", "sees")
+    composition = compose(system)
+    (whole,) = derived_contract(composition, composition.whole).nodes
+    found = {clause.name: clause for clause in whole.guarantees}
+    text = " ".join(to_rcl(derived_contract(composition, composition.whole)).split())
+    assert "guarantee eye_sees with probability >= 0.99 given ( in.near ) ( out.seen )" in text
+    assert "guarantee eye_lasts with probability >= 0.9 per run ( in.near -> out.sure )" in text
+    assert found["brake_stops"].chance is None
+    plan = f"subsystems: {{front: {{nodes: [eye, brake], persistence: {{because: latched}}}}}}{REST}"
+    make(tmp_path / "two", RCL, plan)
+    told = avow("compose", "two", cwd=tmp_path).stdout
+    assert "guarantees brake.stops: out.seen → out.stop" in told
+    assert "eye.sees" not in told

@@ -74,6 +74,17 @@ def test_smtlib_is_accepted_by_z3(root: Path) -> None:
             assert len(z3.parse_smt2_string(script)) > 0
 
 
+def test_smtlib_leaves_a_probability_out_and_names_it(root: Path) -> None:
+    from avow.solving.smtlib import to_smtlib
+
+    made = to_smtlib(load_contract([root / "contracts/delivery_robot/system.rcl"]))
+    assert [d.message for d in made.missing] == [
+        f"{name} is left out: it has a probability" for name in ("detector.sees", "tracker.reads", "tracker.follows")
+    ]
+    assert all(d.code == "SMT001" and d.span is not None for d in made.missing)
+    assert "clause sees" not in made.text
+
+
 @pytest.mark.needs_cvc5
 def test_smtlib_is_accepted_by_cvc5(root: Path) -> None:
     import cvc5

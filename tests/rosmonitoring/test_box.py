@@ -61,7 +61,7 @@ def test_the_range_of_a_column_is_a_bound(make_system: Make) -> None:
 @pytest.mark.parametrize(
     ("box", "table", "words"),
     [
-        ({"in.q": [0, 1]}, "", "'in.q' is none of the inputs of type REAL: in.r"),
+        ({"in.q": [0, 1]}, "", "'in.q' is no input of type REAL"),
         ({"in.r": [2, 1]}, "", "in.r is an interval without values"),
         ({"in.r": {"data": "sen.csv", "column": "r"}}, "run,r\n1,2\n", "'sen.csv' is no table"),
         (

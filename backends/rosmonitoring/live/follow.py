@@ -61,8 +61,7 @@ def follow(
                     said = {**event, "topic": heard.topic.removesuffix(RAW)}
                     found, passed = running.offer(said)
                     if passed is not None:
-                        changed = {k: v for k, v in passed.items() if k != PUBLISHER and v is not said[k]}
-                        heard.forward(changed)
+                        heard.forward({k: v for k, v in passed.items() if k != PUBLISHER and v is not said[k]})
                         lines.append(passed)
                 else:
                     found = list(running.step(event))
