@@ -17,8 +17,8 @@ from avow.formulas import values
 from avow.formulas.values import Data, Element, FunctionValue, Value
 from avow.language import sorts as s
 from avow.language import terms as t
+from avow.language.enclosures import NotEvaluable
 from avow.language.operators import OPERATORS, implementation
-from avow.language.roots import NotEvaluable
 
 __all__ = ["Code", "Compiler", "Domains", "Env", "NotEvaluable", "combinations", "finite_values", "member_of"]
 

@@ -14,7 +14,9 @@ from typing import Any
 from avow.evaluation.compiler import Code, Compiler, Domains, Env, NotEvaluable, finite_values
 from avow.evaluation.quantifier_search import Search
 from avow.formulas.renaming import rename_apart
-from avow.formulas.values import Value
+from avow.formulas.values import SequenceValue, Value
+from avow.language.enclosures import Enclosed
+from avow.language.sorts import BOOL
 from avow.language.terms import Quantified, Quantifier, Term
 
 __all__ = [
@@ -22,6 +24,7 @@ __all__ = [
     "Evaluator",
     "NotEvaluable",
     "compile_counterexample",
+    "compile_number",
     "compile_term",
     "evaluate",
     "finite_values",
@@ -41,10 +44,28 @@ def evaluate(term: Term, valuation: Mapping[str, Value], *, domains: Domains | N
 
 
 def compile_term(term: Term, *, domains: Domains | None = None) -> Evaluator:
-    """Compile once, evaluate often. The result raises NotEvaluable; so does compiling a term nested too deeply.
+    """Compile once, evaluate often. The result raises NotEvaluable, also for a number that can only be enclosed. So
+    does compiling a term nested too deeply.
 
     A function's table must not be changed after it was passed: an index of it may be kept.
     """
+    value_of = compile_number(term, domains=domains)
+    return value_of if term.sort == BOOL else lambda valuation: _kept(value_of(valuation))
+
+
+def _kept(value: Value) -> Value:
+    """A value that may be remembered and looked up."""
+    match value:
+        case Enclosed():
+            raise NotEvaluable(f"{value}: a number that can only be enclosed")
+        case SequenceValue(items=items) | tuple(items):
+            for item in items:
+                _kept(item)
+    return value
+
+
+def compile_number(term: Term, *, domains: Domains | None = None) -> Evaluator:
+    """As `compile_term`, with numbers that can only be enclosed: they are compared, and nothing else."""
     compiler = Compiler(domains or {}, quantified)
     code = guarded(lambda: compiler.code(rename_apart(term)))
     fill = filler(compiler)

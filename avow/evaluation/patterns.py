@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -9,7 +10,8 @@ from avow.evaluation.compiler import Compiler, Env, NotEvaluable, member_of
 from avow.formulas import values
 from avow.formulas.renaming import bound_names
 from avow.formulas.values import Data
-from avow.language.roots import Surd, quotient
+from avow.language.enclosures import Irrational
+from avow.language.roots import quotient
 from avow.language.sorts import IntegerSort, NaturalSort
 from avow.language.terms import Arithmetic, Construct, Negative, SequenceTerm, Term, TupleTerm, Variable, Widen
 
@@ -49,7 +51,14 @@ def pattern(compiler: Compiler, term: Term, unbound: set[str]) -> Match | None:
             if narrow is None:
                 return None
             whole = narrow
-            return lambda env, value: not isinstance(value, Surd) and value.denominator == 1 and whole(env, int(value))
+
+            def of_whole(env: Env, value: Any) -> bool:
+                if isinstance(value, Irrational):
+                    below: Any = math.floor(value)
+                    return bool(value == below)  # which is false, or cannot be told
+                return value.denominator == 1 and whole(env, int(value))
+
+            return of_whole
         case Negative(term=inside):
             positive = pattern(compiler, inside, unbound)
             if positive is None:

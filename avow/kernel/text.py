@@ -1,18 +1,23 @@
 """A formula as SMT-LIB 2.6 text: the one translation that a certified claim depends on. Nothing is simplified.
 
 NATURAL is Int, with membership asserted wherever a natural can occur: for free and bound variables, functions' results,
-parts of data; an element beyond a sequence's end is some value of its type. A quotient by zero and the square root of
-a negative number are some value. Free functions are uninterpreted functions; functions under a quantifier are arrays.
+parts of data; an element beyond a sequence's end is some value of its type. A quotient by zero, the square root of a
+negative number and the angle of no vector are some value. A sine, a cosine and an angle are a number each for which the
+facts of `avow.language.facts` hold. Free functions are uninterpreted; functions under a quantifier are arrays.
 """
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Callable, Iterable, Mapping
 from fractions import Fraction
 from functools import reduce
 
+from avow.kernel.solvers import BOUNDED
 from avow.language import sorts as s
 from avow.language import terms as t
+from avow.language.bounds import closed
+from avow.language.facts import known, together
 from avow.language.subterms import subterms
 
 # forms that are one SMT-LIB function of their parts; comparisons and arithmetic are written as in RCL
@@ -27,7 +32,7 @@ BUILTINS: dict[t.Builtin, Callable[..., str]] = {
     t.Builtin.MIN: lambda *all_: reduce(lambda a, b: f"(ite (< {b} {a}) {b} {a})", all_),
     t.Builtin.MAX: lambda *all_: reduce(lambda a, b: f"(ite (> {b} {a}) {b} {a})", all_),
 }
-assert (OTHERS := set(t.Builtin) - BUILTINS.keys()) == {t.Builtin.SQRT}, f"no text in {__file__} for {OTHERS}"
+assert (OTHERS := set(t.Builtin) - BUILTINS.keys()) == {t.Builtin.SQRT, *t.CIRCULAR}, f"no text for {OTHERS}"
 
 # the name of a free variable, with its sort (an INTEGER input may read a NATURAL output); the name of a bound one
 Symbols = Callable[[t.Variable], tuple[str, s.Sort]]
@@ -43,6 +48,7 @@ class Text:
 
     def __init__(self) -> None:
         self.declarations, self.free, self._sorts = dict[str, str](), dict[str, s.Sort](), dict[str, s.Sort]()
+        self._bounded = defaultdict[tuple[t.Builtin, ...], list[tuple[str, ...]]](list)
 
     def formula(self, term: t.Term, symbols: Symbols, bound: Bound | None = None) -> str:
         """The formula's text; its bound variables are numbered from the first on. Raises Untranslatable."""
@@ -56,7 +62,7 @@ class Text:
         """A question to a solver: can these formulas hold, for values of their types?"""
         facts = [self.member(sort, name) for name, sort in self.free.items()]
         lines = [f"(assert {each})" for each in (*facts, *assertions) if each is not None]
-        return "\n".join(["(set-logic ALL)", *self.declarations.values(), *lines, ""])
+        return "\n".join([BOUNDED if self._bounded else "(set-logic ALL)", *self.declarations.values(), *lines, ""])
 
     def declare(self, name: str, sort: s.Sort) -> None:
         if self.free.setdefault(name, sort) != sort:
@@ -166,13 +172,15 @@ class Text:
                 return ("{}" if operator == "==" else "(not {})").format(self.same(left, right, bound))
             case t.Compare(operator=head) | t.Arithmetic(operator=head):
                 return form(head, term.children)
+            case t.Operation(operator=name) if name not in BUILTINS and any(part in bound for part in subterms(term)):
+                raise Untranslatable(f"`{name}` of what is quantified")
             case t.Operation(operator=t.Builtin.SQRT, arguments=(square,)):
-                if any(part in bound for part in subterms(square)):
-                    raise Untranslatable("a square root of what is quantified")
                 name = symbol(f"sqrt {(said := self.say(square, bound))}")
                 is_root = f"(and (>= {name} 0) (= (* {name} {name}) {said}))"
                 self.declarations[name] = f"(declare-fun {name} () Real)\n(assert (=> (>= {said} 0) {is_root}))"
                 return name
+            case t.Operation(operator=name, arguments=arguments) if name in t.CIRCULAR:
+                return self.circular(name, arguments, bound)
             case t.Operation(operator=builtin, arguments=arguments):
                 return BUILTINS[builtin](*(self.say(a, bound) for a in arguments))
             case t.In(item=item, collection=t.SetTerm(items=items) | t.SequenceTerm(items=items)):
@@ -195,6 +203,20 @@ class Text:
                 return form(FORMS[type(term)], term.children)
             case _:  # a range or a set in a place where it has no text
                 raise Untranslatable(f"{type(term).__name__} here")
+
+    def circular(self, operator: t.Builtin, arguments: tuple[t.Term, ...], bound: Bound) -> str:
+        """The name of a sine, a cosine or an angle, declared with what is known of it, and of it and earlier ones."""
+        given, of = [self.say(a, bound) for a in arguments], together(operator)
+        names = [symbol(f"{each} {' '.join(given)}") for each in of]
+        if names[0] not in self.declarations:
+            values = [closed(t.Operation(each, arguments, s.REAL)) for each in of]
+            parts, earlier = (*given, *names), self._bounded[of]
+            inner = next((v for v in self._bounded[together(t.Builtin.ATAN2)] if [v[-1]] == given), None)
+            facts = [self.say(fact, called) for fact, called in known(of, parts, values, earlier, inner)]
+            declared = [f"(declare-fun {name} () Real)" for name in names]
+            self.declarations[names[0]] = "\n".join([*declared, *(f"(assert {fact})" for fact in facts)])
+            earlier.append(parts)
+        return names[of.index(operator)]
 
     def name(self, variable: t.Variable, bound: Bound) -> str:
         if variable not in bound:

@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 from fractions import Fraction
 
+from avow.base.optional import complete
 from avow.base.records import dataclass
 from avow.language import terms as t
-from avow.language.operators import FLIPPED, OPPOSITE
-from avow.language.sorts import BoolSort
+from avow.language.enclosures import NotEvaluable, Number
+from avow.language.operators import FLIPPED, OPERATORS, OPPOSITE, implementation
+from avow.language.sorts import BoolSort, IntegerSort, NaturalSort, RealSort
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,29 +49,25 @@ def bounds(formula: t.Term) -> Iterator[Bound]:
 
 
 def constant(term: t.Term) -> Fraction | None:
+    """The value of a numeric term without variables; None for every other term, and if it is irrational."""
+    number = closed(term)
+    return Fraction(number) if isinstance(number, int | Fraction) else None
+
+
+def closed(term: t.Term) -> Number | None:
     """The value of a numeric term without variables; None for every other term."""
     match term:
-        case t.Literal(value=bool() | str()):
-            return None
-        case t.Literal(value=value):
-            return Fraction(value)
-        case t.Widen(term=inner):
-            return constant(inner)
-        case t.Negative(term=inner):
-            number = constant(inner)
-            return None if number is None else -number
-        case t.Arithmetic(operator=operator, left=left, right=right):
-            first = constant(left)
-            second = constant(right) if first is not None else None
-            if first is None or second is None or (operator == "/" and second == 0):
+        case t.Literal(value=int() | Fraction() as value) if not isinstance(value, bool):
+            return value
+        case t.Widen() | t.Negative() | t.Arithmetic() | t.Operation(sort=RealSort() | IntegerSort() | NaturalSort()):
+            parts: list[Number] | None = complete(map(closed, term.children))
+            if parts is None or isinstance(term, t.Widen):
+                return parts[0] if parts else None
+            if isinstance(term, t.Negative):
+                return -parts[0]
+            try:
+                found: Number = implementation(OPERATORS[term.operator].evaluate)(*parts)
+            except NotEvaluable:
                 return None
-            match operator:
-                case "+":
-                    return first + second
-                case "-":
-                    return first - second
-                case "*":
-                    return first * second
-                case _:  # /
-                    return first / second
+            return found
     return None

@@ -96,9 +96,12 @@ def may_lack_value(term: t.Term) -> bool:
             return False
         case t.Operation(operator=operator):
             match operator:
-                case t.Builtin.XOR | t.Builtin.ABS | t.Builtin.MIN | t.Builtin.MAX | t.Builtin.MOD | t.Builtin.DIV:
-                    return False  # the divisor of `mod` and `div` is a positive literal
-                case t.Builtin.SQRT:
+                case (
+                    t.Builtin.XOR | t.Builtin.ABS | t.Builtin.MIN | t.Builtin.MAX | t.Builtin.SIN | t.Builtin.COS
+                    | t.Builtin.MOD | t.Builtin.DIV  # whose divisor is a positive literal
+                ):  # fmt: skip
+                    return False
+                case t.Builtin.SQRT | t.Builtin.ATAN2:
                     return True
                 case _:
                     assert_never(operator)
@@ -160,9 +163,9 @@ def _risks(atom: t.Term, sequences: Collection[t.Variable] | None, facts: Facts)
             asked.append(t.Compare("<", index, t.Length(sequence, NATURAL), atom.span))
             yield from (each for each in asked if not _follows(each, facts))
         case t.Arithmetic(operator="/", right=right) if sequences is None:
-            asked = [t.Compare(sign, right, t.Literal(Fraction(0), REAL), atom.span) for sign in ("!=", ">", "<")]
-            if not any(_follows(each, facts) for each in asked):
-                yield asked[0]
+            yield from _one_not_zero((right,), facts, atom)
+        case t.Operation(operator=t.Builtin.ATAN2, arguments=vector) if sequences is None:
+            yield from _one_not_zero(vector, facts, atom)
         case t.Operation(operator=t.Builtin.SQRT, arguments=(inner,)) if sequences is None:
             wanted = t.Compare(">=", inner, t.Literal(Fraction(0), REAL), atom.span)
             if not (_is_never_negative(inner) or _follows(wanted, facts)):
@@ -179,6 +182,14 @@ def _risks(atom: t.Term, sequences: Collection[t.Variable] | None, facts: Facts)
             yield from _parts(defined(part, sequences, facts))
         else:
             yield from _risks(part, sequences, facts)
+
+
+def _one_not_zero(terms: Sequence[t.Term], facts: Facts, atom: t.Term) -> Iterator[t.Term]:
+    """The condition that some term is not zero, unless it plainly follows from the facts."""
+    signs = ("!=", ">", "<")
+    asked = [[t.Compare(sign, term, t.Literal(Fraction(0), REAL), atom.span) for sign in signs] for term in terms]
+    if not any(_follows(each, facts) for row in asked for each in row):
+        yield asked[0][0] if len(asked) == 1 else t.Or(tuple(row[0] for row in asked), atom.span)
 
 
 def _risks_before(atom: t.History, sequences: Collection[t.Variable] | None, facts: Facts) -> Iterator[t.Term]:

@@ -96,8 +96,8 @@ _HINTS = {
     "write `TRUE`": "true",
     "write `FALSE`": "false",
     _ONE_STEP: "always globally finally previously old pre prev last",
-    "RCL has `+ - * /`, `abs`, `min`, `max`, `mod`, `div`, `sqrt`, and no other functions of numbers": "sin cos tan "
-    "atan2 pow exp log floor ceil round fabs minimum maximum remainder quotient",
+    "RCL has `+ - * /`, `abs`, `min`, `max`, `mod`, `div`, `sqrt`, `sin`, `cos`, `atan2`; no other functions": "tan "
+    "asin acos pow exp log floor ceil round fabs minimum maximum remainder quotient",
     "write `sqrt(r)`, `norm(x, y)`, `dot(v, w)`": "sqrt norm dot hypot dist distance magnitude scalar",
     "write the length of a sequence as `length(s)`": "len size count card length",
     "write a range as `<a upto b>`, both ends included": "range seq to",

@@ -20,6 +20,7 @@ from avow.base.diagnostics import Span
 from avow.base.plain import count
 from avow.base.records import dataclass
 from avow.language.conversions import NUMERIC, WHOLE, common, joined, widen
+from avow.language.enclosures import angle, cosine, sine
 from avow.language.roots import quotient, root
 from avow.language.sorts import BOOL, INTEGER, NATURAL, REAL, FunctionSort, SetSort, Sort
 from avow.language.terms import Builtin, Compare, Conditional, Iff, Literal, Negative, Not, Operation, Term
@@ -109,6 +110,8 @@ LIFTED = "lifted"
 _IN_PARTS = Why("its parts are evaluated one after another, as far as they are needed")
 _NO_WHOLE_DIVISION = Why("RML's conditions have neither whole division nor remainder")
 _NO_ROOT_THERE = Why("its language has no square roots")
+_NO_ANGLE_THERE = Why("its language has no sine, cosine or arc tangent")
+_BOUNDED = Why("the translation names the value, and states bounds of it")
 _NOT_COMPUTED = Why("programs say it with IF")
 _A_FORM = Why("it is a form of the terms itself, of as many parts as the form has")
 _ARITHMETIC = Why("it is arithmetic: no form of the terms says it")
@@ -210,6 +213,10 @@ _ROWS = (
               _ARITHMETIC, (2, 2)),
     _function(Builtin.SQRT, Typing.ROOT, root, Why("the translation names the root, and states its square"), "*",
               _NO_ROOT_THERE, _NO_ROOT_THERE, _ARITHMETIC, (1, 1)),
+    _function(Builtin.SIN, Typing.ROOT, sine, _BOUNDED, "*", _NO_ANGLE_THERE, _NO_ANGLE_THERE, _ARITHMETIC, (1, 1)),
+    _function(Builtin.COS, Typing.ROOT, cosine, _BOUNDED, "*", _NO_ANGLE_THERE, _NO_ANGLE_THERE, _ARITHMETIC, (1, 1)),
+    _function(Builtin.ATAN2, Typing.QUOTIENT, angle, _BOUNDED, "*", _NO_ANGLE_THERE, _NO_ANGLE_THERE, _ARITHMETIC,
+              (2, 2)),
     Operator("if", Level.LOOSEST, Typing.BRANCHES, "if ", "if ", _IN_PARTS, lambda z, c, a, b: z.If(c, a, b),
              "ite", "if", LIFTED, _NOT_COMPUTED, _A_FORM, _A_FORM),
 )  # fmt: skip
@@ -266,11 +273,11 @@ def operation(name: Builtin, arguments: Sequence[Term], span: Span | None) -> Te
                 if argument.sort != BOOL:
                     return Mistyped("RCL301", f"`{name}` is of formulas, and this is of type {{}}", k)
             return Operation(name, tuple(arguments), BOOL, span)
-        case Typing.NUMBER | Typing.NUMBERS | Typing.ROOT:
+        case Typing.NUMBER | Typing.NUMBERS | Typing.ROOT | Typing.QUOTIENT:
             for k, argument in enumerate(arguments):
                 if not isinstance(argument.sort, NUMERIC):
                     return Mistyped("RCL308", f"`{name}` is of numbers, and this is of type {{}}", k)
-            if typing is Typing.ROOT:
+            if typing in (Typing.ROOT, Typing.QUOTIENT):
                 return Operation(name, tuple(map(widen, arguments)), REAL, span)
             made = common(list(arguments))
             assert made is not None, "numbers have a common sort"
@@ -288,7 +295,7 @@ def operation(name: Builtin, arguments: Sequence[Term], span: Span | None) -> Te
                 return Mistyped("RCL311", f"`{name}` divides by a positive whole number that is written down", 1, hint)
             whole: Sort = NATURAL if name is Builtin.MOD or dividend.sort == NATURAL else INTEGER
             return Operation(name, (dividend, divisor), whole, span)
-        case Typing.EQUALS | Typing.ORDER | Typing.QUOTIENT | Typing.BRANCHES:
+        case Typing.EQUALS | Typing.ORDER | Typing.BRANCHES:
             raise AssertionError(f"`{name}` is written like a function, and typed as no function is")
         case _:
             assert_never(typing)

@@ -9,33 +9,28 @@ that is left as a `Surd` is rational, so that enclosing it by rationals ever mor
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from fractions import Fraction
-from functools import total_ordering
 from math import isqrt
 
 from avow.base.records import dataclass
+from avow.language.enclosures import Enclosed, Ends, Irrational, NotEvaluable, Number
 
 
-class NotEvaluable(Exception):  # noqa: N818 - it names a state, not a fault
-    """Exact evaluation is impossible here; `reason` is a clause for people: ``division by zero``."""
-
-    def __init__(self, reason: str) -> None:
-        super().__init__(reason)
-        self.reason = reason
-
-
-@total_ordering
 @dataclass(frozen=True, slots=True)
-class Surd:
+class Surd(Irrational):
     """An irrational number."""
 
     summands: frozenset[Fraction]
 
     def __add__(self, other: Number) -> Number:
+        if isinstance(other, Enclosed):
+            return NotImplemented
         return _sum((*self.summands, *_summands(other)))
 
     def __mul__(self, other: Number) -> Number:
+        if isinstance(other, Enclosed):
+            return NotImplemented
         return _sum(a * b for a in self.summands for b in _summands(other))
 
     def __truediv__(self, other: Number) -> Number:
@@ -44,33 +39,16 @@ class Surd:
     def __rtruediv__(self, other: Number) -> Number:
         return _inverse(self) * other
 
-    def __sub__(self, other: Number) -> Number:
-        return self + -other
-
-    def __rsub__(self, other: Number) -> Number:
-        return -self + other
-
-    __radd__, __rmul__ = __add__, __mul__
-
     def __neg__(self) -> Surd:
         return Surd(frozenset(-q for q in self.summands))
 
     def __abs__(self) -> Surd:
         return -self if self < 0 else self
 
-    def __lt__(self, other: Number) -> bool:
-        difference = self - other
-        return _sign(difference) < 0 if isinstance(difference, Surd) else difference < 0
-
-    def __floor__(self) -> int:
-        return next(low for low, high in map(_whole, _enclosures(self)) if low == high)
-
-    def __ceil__(self) -> int:
-        return self.__floor__() + 1
-
-    def __float__(self) -> float:
-        low, high = next(_enclosures(self))
-        return float((low + high) / 2)
+    def within(self, bits: int) -> Ends:
+        roots = [(isqrt((abs(q.numerator) << 2 * bits) // q.denominator), q > 0) for q in self.summands]
+        low = sum(root if positive else -root - 1 for root, positive in roots)
+        return low, low + len(roots)
 
     def __str__(self) -> str:
         parts = ((q, _rational_root(abs(q))) for q in sorted(self.summands, reverse=True))
@@ -78,15 +56,12 @@ class Surd:
         return " ".join(said).removeprefix("+ ")
 
 
-Number = int | Fraction | Surd
-
-
 def root(number: Number) -> Number:
-    """The square root. Raises NotEvaluable: a negative number has none, and a root of a root is not written so."""
+    """The square root. Raises NotEvaluable: a negative number has none."""
     if number < 0:
         raise NotEvaluable("the square root of a negative number")
-    if isinstance(number, Surd):
-        raise NotEvaluable("the square root of an irrational number, which Avow does not compute")
+    if isinstance(number, Irrational):
+        return Enclosed("sqrt", number)
     return _sum((Fraction(number),))
 
 
@@ -100,6 +75,7 @@ def quotient(dividend: Number, divisor: Number) -> Number:
 def _summands(number: Number) -> Iterable[Fraction]:
     if isinstance(number, Surd):
         return number.summands
+    assert not isinstance(number, Irrational)
     rational = Fraction(number)
     return (rational * abs(rational),)
 
@@ -123,31 +99,11 @@ def _rational_root(square: Fraction) -> Fraction | None:
 
 
 def _inverse(number: Number) -> Number:
-    if not isinstance(number, Surd):
+    if not isinstance(number, Irrational):
         return 1 / Fraction(number)
-    match sorted(number.summands):
+    match sorted(number.summands) if isinstance(number, Surd) else ():
         case [only]:
             return Surd(frozenset((1 / only,)))
         case [a, b]:  # 1 / (s + t) = (s - t) / (s * s - t * t)
             return _sum((a, -b)) / (abs(a) - abs(b))
-    raise NotEvaluable("a quotient by a sum of three or more square roots, which Avow does not compute")
-
-
-def _enclosures(surd: Surd) -> Iterator[tuple[Fraction, Fraction]]:
-    """Rationals below and above, each time closer than twice as many binary digits."""
-    bits = 64
-    while True:
-        roots = [(isqrt((abs(q.numerator) << 2 * bits) // q.denominator), q > 0) for q in surd.summands]
-        low = sum(root if positive else -root - 1 for root, positive in roots)
-        yield Fraction(low, 1 << bits), Fraction(low + len(roots), 1 << bits)
-        bits *= 2
-
-
-def _whole(ends: tuple[Fraction, Fraction]) -> tuple[int, int]:
-    low, high = ends
-    return low.__floor__(), high.__floor__()
-
-
-def _sign(surd: Surd) -> int:
-    """1 or -1."""
-    return next(1 if low >= 0 else -1 for low, high in _enclosures(surd) if low >= 0 or high <= 0)
+    return Enclosed("inverse", number)

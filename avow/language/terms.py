@@ -46,10 +46,17 @@ class Builtin(StrEnum):
     MOD = "mod"
     DIV = "div"
     SQRT = "sqrt"
+    SIN = "sin"
+    COS = "cos"
+    ATAN2 = "atan2"
 
 
 CALLED = ("length", "indices", "norm", "dot")
 """Words that are written like operators, and stand for other terms."""
+
+
+CIRCULAR = (Builtin.SIN, Builtin.COS, Builtin.ATAN2)
+"""Operators of which solvers know bounds only (`avow.language.facts`)."""
 
 
 class Past(StrEnum):

@@ -95,6 +95,14 @@ class _Reader:
                 return _product(factors[0], factors[1], sign)
             case t.Operation(operator=t.Builtin.SQRT):
                 return _root(parts[0])
+            case t.Operation(operator=t.Builtin.SIN | t.Builtin.COS as name, arguments=(angle,)):
+                if parts[0] not in (None, NUMBER, unit("rad")) and not _is_number(angle):
+                    told = f"`{name}` takes an angle in rad, and `{show_term(angle, 'rcl')}` is in {_shown(parts[0])}"
+                    self.found.append(Clash(told, angle.span or term.span))
+                return NUMBER
+            case t.Operation(operator=t.Builtin.ATAN2, arguments=vector):
+                self.same(term, vector, parts)
+                return unit("rad")
             case t.Arithmetic() | t.Compare() | t.Operation() | t.Conditional():
                 of = parts[1:] if isinstance(term, t.Conditional) else parts
                 return self.same(term, term.children[-len(of) :], of)

@@ -170,7 +170,9 @@ def _ask_cvc5(script: str, limit: int) -> tuple[str, int]:
     solver = cvc5.Solver(terms)
     solver.setOption("rlimit-per", str(limit))
     solver.setOption("full-saturate-quant", "true")
-    if "sqrt!" in script:  # without, it looks for an irrational number for ever, and counts no steps
+    if re.search(
+        "(sqrt|sin|cos|atan2)!", script
+    ):  # without, it looks for an irrational number for ever, and counts no steps
         solver.setOption("nl-cov", "true")
     if _PRODUCT.search(script) and re.search(r"\((forall|exists) ", script):
         solver.setOption("cegqi", "false")  # it never ends there, and counts no steps (seen: ``exists x. x * x == y``)

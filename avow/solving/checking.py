@@ -24,7 +24,8 @@ Engine = OneOf["smt", "qsat"]
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """Z3's answer to one question about expressions. `core` are the labels of tracked assertions that conflict."""
+    """Z3's answer to one question about expressions. `core` are the labels of tracked assertions that conflict. An
+    `unknown` has a model if it is one of bounds only."""
 
     status: Status
     model: Model | None = None
@@ -113,7 +114,7 @@ def _ask(
         case "unsat":
             return "unsat", None, loaded.core(), ""
         case "unknown":
-            return "unknown", None, (), answer.reason
+            return "unknown", loaded.solver.model() if answer.reason == BOUNDED else None, (), answer.reason
         case _:
             assert_never(answer.status)
 
@@ -163,19 +164,25 @@ class SolverResult:
     reason: str = ""
 
 
+BOUNDED = "the solver has a model, but knows only bounds of `sin`, `cos` and `atan2`"
+"""The model may be none; it counts if it is replayed, with closer bounds at its values."""
+
 HANGS = "the solver hangs"
 
 
-def put(translator: Sorts, solver: Any, effort: float, seed: int | None = 0, *assumptions: Expr) -> SolverResult:
+def put(translator: Translator, solver: Any, effort: float, seed: int | None = 0, *assumptions: Expr) -> SolverResult:
     """Check what a solver holds: every question to Z3 goes through here. Its steps bound it and are counted
     (`avow.solving.limits`); the clock only ends a call that hangs. Raises Z3Exception."""
     configured(solver, effort, seed)
+    bounded = False
     if translator.session.roots:  # reading the assertions copies them, which costs time and can change the answer
-        solver.add(*(fact for _, fact in translator.root_facts(solver.assertions())))
+        roots = translator.root_facts(solver.assertions())
+        solver.add(*translator.facts_of(roots))
+        bounded = any(root.is_bounded for root in roots)
     result = solver.check(*assumptions)
     charge(translator, solver)
     if result == z3.sat:
-        return SolverResult("sat")
+        return SolverResult("unknown", BOUNDED) if bounded else SolverResult("sat")
     if result == z3.unsat:
         return SolverResult("unsat")
     return SolverResult("unknown", _reason(solver))
@@ -224,13 +231,13 @@ def _ask_qsat(
     translator: Translator, assertions: Sequence[Expr], tracked: Sequence[tuple[str, Expr]], effort: int
 ) -> tuple[Status, object | None, tuple[str, ...], str]:
     everything = [*assertions, *(expr for _, expr in tracked)]
-    everything += [fact for _, fact in translator.root_facts(everything)]
+    everything += translator.facts_of(translator.root_facts(everything))
     tactic = "nlqsat" if _real_polynomials(everything) else "qsat"
     solver = z3.Tactic(tactic, ctx=translator.context).solver()
     solver.add(*everything)
     answer = put(translator, solver, effort, None if tactic == "nlqsat" else 0)
-    if answer.status == "sat":
-        return "sat", solver.model(), (), ""
+    if answer.status == "sat" or answer.reason == BOUNDED:
+        return answer.status, solver.model(), (), answer.reason
     if answer.status == "unsat" and _arithmetic_only(everything):
         return "unsat", None, tuple(label for label, _ in tracked), ""
     return "unknown", None, (), answer.reason

@@ -20,6 +20,7 @@ from typing import assert_never
 from avow.base.records import dataclass
 from avow.base.tuning.effort import (
     ANOTHER_SOLVER_EFFORT,
+    CLOSER_LOOKS,
     FIRST_LOOK_EFFORT,
     QUESTION_EFFORT,
     QUESTION_SHARE,
@@ -37,7 +38,7 @@ from avow.language.sorts import BOOL, FunctionSort, OpaqueSort, SequenceSort
 from avow.language.subterms import subterms
 from avow.language.terms import Apply, Quantified, Term, Variable
 from avow.solving import smtlib
-from avow.solving.checking import Answer, Engine, Status, check, with_small_numbers
+from avow.solving.checking import BOUNDED, Answer, Engine, Status, check, with_small_numbers
 from avow.solving.limits import NO_ANSWER, allowed, budget, spent, tried, until
 from avow.solving.models import Model
 from avow.solving.replay import is_partial, replay
@@ -78,7 +79,7 @@ class Entailment:
 Values = OneOf["shown", "if any", "unused", "never"]
 """The use of a solution's values: shown to people, with small numbers; the same, but they may be missing (polynomials
 can have solutions without an exact decimal); or not used. With `never` only a contradiction matters: the solver's own
-`sat` ends the search, and is not replayed."""
+`sat` ends the search, and is not replayed, except if it is one of bounds."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -198,7 +199,8 @@ def _solve(translator: Translator, question: _Asked) -> Solution:
 
     def replayed(answer: Answer, engine: str, *, simple: bool) -> Solution | None:
         """The values of its model, if they can be read and replayed."""
-        for smaller in (False, True) if question.values == "unused" else (True,):
+        either = (True, False) if answer.reason == BOUNDED else (True,)
+        for smaller in (False, True) if question.values == "unused" else either:
             one = with_small_numbers(translator, whole, numbers, answer, seed=seed) if smaller else answer
             values = _read(one.model, free) if one.model is not None else None
             if values is None or (simple and not all(map(_is_simple, values.values()))):
@@ -208,14 +210,25 @@ def _solve(translator: Translator, question: _Asked) -> Solution:
         return None
 
     def asked(effort: float, seed: int, engine: Engine = "smt") -> tuple[Answer, Solution | None]:
-        """An engine's answer, and its solution, if it counts."""
-        answer = check(translator, background, effort=max(1, int(effort)), seed=seed, tracked=tracked, engine=engine)
-        name = "z3" if engine == "smt" else "z3, qsat"
+        """An engine's answer, and its solution, if it counts. Where only bounds of values are known, they are made
+        closer at a model that does not."""
+        limit, name = max(1, int(effort)), "z3" if engine == "smt" else "z3, qsat"
+        for look in range(CLOSER_LOOKS):
+            answer = check(translator, background, effort=limit, seed=seed, tracked=tracked, engine=engine)
+            found = judged(answer, engine, name)
+            if found is not None or answer.model is None or answer.reason != BOUNDED or look == CLOSER_LOOKS - 1:
+                break
+            closer = translator.facts_near(whole, answer.model.evaluate)
+            background.extend(closer)
+            whole.extend(closer)
+        return answer, found
+
+    def judged(answer: Answer, engine: Engine, name: str) -> Solution | None:
         if answer.status == "unsat":
-            return answer, Solution("unsat", core=answer.core, engine=name)
-        if question.values == "never":
-            return answer, Solution("sat", engine=name) if answer.status == "sat" else None
-        return answer, replayed(answer, name, simple=engine == "smt")
+            return Solution("unsat", core=answer.core, engine=name)
+        if question.values == "never" and answer.reason != BOUNDED:
+            return Solution("sat", engine=name) if answer.status == "sat" else None
+        return replayed(answer, name, simple=engine == "smt")
 
     reason = ""
     for plain, tables in ROUNDS:

@@ -97,10 +97,10 @@ def opaque_sorts(formula: Term) -> frozenset[OpaqueSort]:
 
 @by_identity(500)
 def is_partial(formula: Term) -> bool:
-    """Whether sequences, divisions or square roots occur."""
+    """Whether sequences, divisions, square roots or angles of vectors occur."""
     return any(
         isinstance(part.sort, SequenceSort)
         or (isinstance(part, Arithmetic) and part.operator == "/")
-        or (isinstance(part, Operation) and part.operator is Builtin.SQRT)
+        or (isinstance(part, Operation) and part.operator in (Builtin.SQRT, Builtin.ATAN2))
         for part in subterms(formula)
     )

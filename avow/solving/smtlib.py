@@ -30,7 +30,7 @@ def formulas_script(formulas: Mapping[str, Term] | Iterable[Term], *, comment: s
     free = frozenset(v for formula in labelled.values() for v in free_variables(formula))
     background = translator.background(free)
     named = [(label, translator.term(formula)) for label, formula in labelled.items()]
-    background += [fact for _, fact in translator.root_facts(expr for _, expr in named)]
+    background += translator.facts_of(translator.root_facts(expr for _, expr in named))
     solver = z3.Tactic("skip", translator.context).solver()  # it only prints: one that solves costs six times as much
     solver.add(*background, *(expr for _, expr in named))
     # Z3 prints declarations first; the assertions are printed one by one, so that each can have its name.

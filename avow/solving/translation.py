@@ -9,18 +9,33 @@ here, so that proofs hold under each (`avow.solving.questions` ensures the same 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+import itertools
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from fractions import Fraction
+from functools import reduce
 from typing import Any, assert_never
 
 from avow.base.diagnostics import Span
-from avow.base.tuning.bounds import FORMULAS_KEPT
+from avow.base.optional import complete
+from avow.base.tuning.bounds import FORMULAS_KEPT, ROOTS_COMPARED
 from avow.formulas.one_point_rule import made_with, without_points
 from avow.language import sorts as s
 from avow.language import terms as t
+from avow.language.enclosures import NotEvaluable, Number
+from avow.language.facts import fact, known, together
 from avow.language.operators import OPERATORS, implementation
 from avow.solving.z3_module import z3
-from avow.solving.z3_sorts import Expr, Meaning, Sorts, Unsupported, kept_session, new_session, parts_of, same_session
+from avow.solving.z3_sorts import (
+    Expr,
+    Meaning,
+    Root,
+    Sorts,
+    Unsupported,
+    kept_session,
+    new_session,
+    parts_of,
+    same_session,
+)
 
 __all__ = ["Expr", "Meaning", "Translator", "Unsupported", "kept_session", "new_session", "same_session"]
 
@@ -137,6 +152,8 @@ class Translator(Sorts):
                 return -parts[0]
             case t.Operation(operator=t.Builtin.SQRT):
                 return self.root(self._real(*parts))
+            case t.Operation(operator=t.Builtin.SIN | t.Builtin.COS | t.Builtin.ATAN2 as name):
+                return self._circular(name, tuple(map(self._real, parts))).constants[name is t.Builtin.COS]
             case t.Operation(operator=name):
                 return implementation(OPERATORS[name].z3)(z3, *(self._fit(part, term.sort) for part in parts))
             case t.Conditional(sort=sort):
@@ -261,10 +278,12 @@ class Translator(Sorts):
         inner = {**bound, **dict(zip(term.variables, constants, strict=True))}
         body = self._term(term.body, inner, meanings)
         members = [self.member(v.sort, c) for v, c in zip(term.variables, constants, strict=True)]
-        for root, fact in self.root_facts([body]):
-            if not {c.get_id() for c in constants}.isdisjoint(part.get_id() for part in parts_of([fact])):
-                constants.append(root)  # it is another number for other values of the variables
-                members.append(fact)
+        for root in self.root_facts([body]):
+            if not {c.get_id() for c in constants}.isdisjoint(part.get_id() for part in parts_of([root.fact])):
+                if root.is_bounded:  # bounds would weaken one quantifier, and strengthen another
+                    raise Unsupported(f"`{root.operations[0]}` of what is quantified", term.span)
+                constants += root.constants  # it is another number for other values of the variables
+                members.append(root.fact)
         allowed = [member for member in members if member is not None]
         if term.quantifier is t.Quantifier.FORALL:
             return z3.ForAll(constants, z3.Implies(self._every(allowed), body) if allowed else body)
@@ -280,6 +299,75 @@ class Translator(Sorts):
         equal = z3.And([one == other for one, other in zip(constants, others, strict=True)])
         exists = z3.Exists(constants, within)
         return z3.And(exists, z3.ForAll([*constants, *others], z3.Implies(z3.And(within, again), equal)))
+
+    # -- values of which bounds are known ------------------------------------------------------------------------------
+
+    def _circular(self, name: t.Builtin, arguments: tuple[Expr, ...]) -> Root:
+        """Constants for a sine and a cosine, or for an angle; `facts_of` say what is known of them."""
+        of = together(name)
+        roots, key = self.session.roots, (of[0], *(a.get_id() for a in arguments))
+        if key not in roots:
+            made = tuple(z3.Real(f"{each}!{len(roots)}", self.context) for each in of)
+            angles = (root.parts for root in roots.values() if t.Builtin.ATAN2 in root.operations)
+            inner = next((parts for parts in angles if parts[-1].eq(arguments[0])), None) if of[1:] else None
+            values = [self._value(each, arguments) for each in of]
+            facts = itertools.starmap(self.term, known(of, (*arguments, *made), values, (), inner))
+            roots[key] = Root(of, arguments, made, z3.And(list(facts)))
+        return roots[key]
+
+    def facts_of(self, roots: Sequence[Root]) -> list[Expr]:
+        """What is known of the roots of a question, one by one and in pairs."""
+        facts = [root.fact for root in roots]
+        for operation in (t.Builtin.SIN, t.Builtin.ATAN2):
+            alike = [root for root in roots if operation in root.operations][:ROOTS_COMPARED]
+            facts += itertools.starmap(self._beside, itertools.combinations(alike, 2))
+        self.session.stated.update(each.get_id() for each in facts)
+        return facts
+
+    def facts_near(self, exprs: Iterable[Expr], value: Callable[[Expr], Expr]) -> list[Expr]:
+        """What is known of the roots that occur because of their exact values at one point."""
+        facts = []
+        for root in self.root_facts(exprs):
+            point = tuple(map(value, root.arguments))
+            if root.is_bounded and all(map(z3.is_rational_value, point)):
+                at = self._circular(root.operations[0], point)
+                facts += [at.fact, self._beside(root, at)]
+        return facts
+
+    def _beside(self, one: Root, other: Root) -> Expr:
+        """What is known of two sines or angles together."""
+        made, key = self.session.beside, (one.constants[0].get_id(), other.constants[0].get_id())
+        if key not in made:
+            names = ("vectors", "turned") if t.Builtin.ATAN2 in one.operations else ("angles",)
+            fixed = any(all(map(z3.is_rational_value, root.arguments)) for root in (one, other))
+            facts = [fact(name, *one.parts, *other.parts) for name in names[: 1 + fixed]]
+            made[key] = z3.And(list(itertools.starmap(self.term, facts)))
+        return made[key]
+
+    def _number(self, expr: Expr) -> Number | None:
+        """The value of an expression without variables; None for any other."""
+        if z3.is_rational_value(expr) or z3.is_int_value(expr):
+            return Fraction(expr.as_fraction() if z3.is_rational_value(expr) else expr.as_long())
+        for root in self.session.roots.values():
+            for constant, operation in zip(root.constants, root.operations, strict=True):
+                if constant.eq(expr):
+                    return self._value(operation, root.arguments)
+        if z3.is_to_real(expr):
+            return self._number(expr.arg(0))
+        signs = {"+": z3.is_add, "-": z3.is_sub, "*": z3.is_mul, "/": z3.is_div}
+        sign = next((sign for sign, is_so in signs.items() if is_so(expr)), None)
+        return None if sign is None else self._value(sign, expr.children())
+
+    def _value(self, operation: str, arguments: Iterable[Expr]) -> Number | None:
+        numbers: list[Number] | None = complete(map(self._number, arguments))
+        if numbers is None:
+            return None
+        act = implementation(OPERATORS[operation].evaluate)
+        try:
+            found: Number = reduce(act, numbers) if operation in "+-*/" else act(*numbers)
+        except NotEvaluable:
+            return None
+        return found
 
     def _every(self, parts: list[Expr]) -> Expr:
         return self.all_of(parts) if parts else self.true()

@@ -14,7 +14,7 @@ from avow.base.diagnostics import Span
 from avow.base.tuning.bounds import QUESTIONS_KEPT
 from avow.formulas.values import Data, Element, FunctionValue, Opaque, SequenceValue, Value
 from avow.language import sorts as s
-from avow.language.terms import Term, Variable
+from avow.language.terms import Builtin, Term, Variable
 from avow.solving.z3_module import z3
 
 Expr = Any
@@ -60,10 +60,34 @@ class Session:
     """Free variables as constants, or as functions."""
     formulas: dict[int, tuple[Term, Expr]] = field(default_factory=dict)
     """By the formula's identity, as formulas are deep."""
-    roots: dict[int, tuple[Expr, Expr]] = field(default_factory=dict)
-    """By the identity of an expression: a constant that is its square root, and the fact that it is."""
+    roots: dict[tuple[str | int, ...], Root] = field(default_factory=dict)
+    """By the operation, and the identities of the expressions that it is applied to."""
+    beside: dict[tuple[int, int], Expr] = field(default_factory=dict)
+    """What is known of two roots together."""
+    stated: set[int] = field(default_factory=set)
+    """The identities of facts of roots that questions had: they are many, and reading them finds no other root."""
     steps: int = 0
     """Z3's steps in the context, as last counted."""
+
+
+@dataclass(slots=True, eq=False)
+class Root:
+    """Constants for values of an operation that Z3 has not: a square root; a sine and a cosine; an angle."""
+
+    operations: tuple[Builtin, ...]
+    arguments: tuple[Expr, ...]
+    constants: tuple[Expr, ...]
+    fact: Expr
+    """What is known of them: the definition of a square root, and bounds of the others."""
+
+    @property
+    def is_bounded(self) -> bool:
+        """Whether only bounds are known."""
+        return self.operations != (Builtin.SQRT,)
+
+    @property
+    def parts(self) -> tuple[Expr, ...]:
+        return *self.arguments, *self.constants
 
 
 _session: ContextVar[Session | None] = ContextVar("session", default=None)
@@ -281,22 +305,23 @@ class Sorts:
 
     def root(self, square: Expr) -> Expr:
         """A constant for the square root of an expression; `root_facts` say which number it is."""
-        roots = self.session.roots
-        if square.get_id() not in roots:
+        roots, key = self.session.roots, (Builtin.SQRT, square.get_id())
+        if key not in roots:
             found = z3.Real(f"sqrt!{len(roots)}", self.context)
             fact = z3.Implies(square >= 0, z3.And(found >= 0, found * found == square))
-            roots[square.get_id()] = found, fact
-        return roots[square.get_id()][0]
+            roots[key] = Root((Builtin.SQRT,), (square,), (found,), fact)
+        return roots[key].constants[0]
 
-    def root_facts(self, exprs: Iterable[Expr]) -> list[tuple[Expr, Expr]]:
-        """The square roots that occur in expressions, and in each other, with what determines each: it belongs to every
-        question about them. An inner root comes before an outer one."""
-        waiting, found = [*exprs], set[int]()
+    def root_facts(self, exprs: Iterable[Expr]) -> list[Root]:
+        """The roots that occur in expressions, and in each other's facts, which belong to every question about them. An
+        inner root comes before an outer one."""
+        stated = self.session.stated
+        waiting, found = [expr for expr in exprs if expr.get_id() not in stated], set[int]()
         while waiting and self.session.roots:
             inside = {part.get_id() for part in parts_of(waiting)} - found
-            waiting = [fact for root, fact in self.session.roots.values() if root.get_id() in inside]
+            waiting = [part for root in self.session.roots.values() if _among(root, inside) for part in root.arguments]
             found |= inside
-        return [pair for pair in self.session.roots.values() if pair[0].get_id() in found]
+        return [root for root in self.session.roots.values() if _among(root, found)]
 
     def real(self, value: Fraction) -> Expr:
         return z3.RealVal(f"{value.numerator}/{value.denominator}", self.context)
@@ -407,3 +432,7 @@ def parts_of(exprs: Iterable[Expr]) -> Iterator[Expr]:
         else:
             yield expr
             stack.extend(expr.children())
+
+
+def _among(root: Root, identities: set[int]) -> bool:
+    return any(constant.get_id() in identities for constant in root.constants)

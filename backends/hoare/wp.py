@@ -252,6 +252,8 @@ def defined(term: t.Term) -> t.Term:
             parts.append(t.Compare("!=", right, t.Literal(Fraction(0), REAL)))
         case t.Operation(operator=t.Builtin.SQRT, arguments=(inner,)):
             parts.append(t.Compare(">=", inner, t.Literal(Fraction(0), REAL)))
+        case t.Operation(operator=t.Builtin.ATAN2, arguments=vector):
+            parts.append(t.Or(tuple(t.Compare("!=", each, t.Literal(Fraction(0), REAL)) for each in vector)))
         case t.Apply(function=t.Variable(sort=FunctionSort(parameters=sorts)), arguments=arguments):
             parts.extend(r for a, s in zip(arguments, sorts, strict=True) for r in in_range(a, s))
         case t.Construct(constructor=name, arguments=arguments, sort=data):

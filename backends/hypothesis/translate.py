@@ -180,6 +180,8 @@ class Translator:
                 return f"{self._at(arguments[0], _SIGN)} // {self._at(arguments[1], _SIGN)}", _MULTIPLY
             case t.Builtin.SQRT:
                 raise Untranslatable("floating point has square roots only nearly")
+            case t.Builtin.SIN | t.Builtin.COS | t.Builtin.ATAN2:
+                raise Untranslatable(f"floating point has `{operator}` only nearly")
 
     def _conjunction(self, items: Sequence[t.Term]) -> str:
         """``0 <= x and x < 9`` as a chain of comparisons."""

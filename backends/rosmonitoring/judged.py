@@ -14,7 +14,7 @@ from types import TracebackType
 from typing import IO, Any, Self
 
 from avow.base.diagnostics import Diagnostic, Rejected
-from avow.evaluation.evaluate import NotEvaluable, compile_term
+from avow.evaluation.evaluate import NotEvaluable, compile_number, compile_term
 from avow.formulas.values import Value
 from avow.language.sorts import IntegerSort, NaturalSort, RealSort
 from avow.language.terms import And, Compare, Iff, Implies, Not, Or, Term
@@ -153,7 +153,7 @@ def _compiled(formula: Term) -> Callable[[Mapping[str, Value]], float]:
         case Compare(operator=operator, left=left, right=right) if isinstance(
             left.sort, RealSort | IntegerSort | NaturalSort
         ):
-            one, other = compile_term(left), compile_term(right)
+            one, other = compile_number(left), compile_number(right)
             return lambda values: _distance(operator, one, other, values)
         case _:  # no threshold
             holds = compile_term(formula)

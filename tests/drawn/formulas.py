@@ -63,6 +63,8 @@ class Knobs:
     """Elements of sequences, and quotients by what may be zero."""
     roots: bool = False
     """Square roots, also of what may be negative."""
+    angles: bool = False
+    """Sines, cosines, and angles also of what may be no vector."""
     bare: float = 0.0
     """Of a part without parentheses."""
     wild: bool = False
@@ -230,6 +232,8 @@ class Formulas:
                 return self._either(of, depth, names)
             case "builtin" if of == REAL and self.knobs.roots and self.random.random() < 0.7:
                 return choice((f"sqrt({inner()})", f"norm({inner()}, {inner()})"))
+            case "builtin" if of == REAL and self.knobs.angles and self.random.random() < 0.8:
+                return choice((f"sin({inner()})", f"cos({inner()})", f"atan2({inner()}, {inner()})"))
             case "builtin":
                 whole = inner(choice((INTEGER, NATURAL)) if of != NATURAL else NATURAL)
                 calls = [f"{choice(('min', 'max'))}({inner()}, {inner()})", f"abs({inner()})"]

@@ -21,6 +21,8 @@ from typing import Any
 from avow.language import terms as t
 from avow.language.sorts import BOOL, BoolSort, DataSort, EnumSort, FunctionSort, Sort, TupleSort
 
+from . import decimals
+
 Step = Mapping[str, Any]
 Run = Sequence[Step]
 NOWHERE: Step = {}
@@ -36,8 +38,8 @@ COMPARED: Mapping[str, Callable[[Any, Any], bool]] = {
 
 
 NEAR = Fraction(1, 10**100)
-"""Numbers that are nearer to each other are the same: square roots are computed to twice as many digits, and nothing
-that tests say of their sums and products distinguishes numbers that are so near."""
+"""Numbers that are nearer to each other are the same: square roots, sines, cosines and angles are computed to twice as
+many digits, and nothing that tests say of their sums and products distinguishes numbers that are so near."""
 
 
 class NoValue(Exception):  # noqa: N818 - it names what a term has
@@ -141,9 +143,9 @@ def members(sort: Sort) -> list[Any]:
 
 @functools.lru_cache(maxsize=20_000)
 def has_value_always(term: t.Term) -> bool:
-    """Whether it has in it no quotient, no element of a sequence and no square root."""
+    """Whether it has in it no quotient, no element of a sequence, no square root and no angle of a vector."""
     partial = isinstance(term, t.Index) or (isinstance(term, t.Arithmetic) and term.operator == "/")
-    partial = partial or (isinstance(term, t.Operation) and term.operator == "sqrt")
+    partial = partial or (isinstance(term, t.Operation) and term.operator in ("sqrt", "atan2"))
     return not partial and all(map(has_value_always, term.children))
 
 
@@ -234,7 +236,9 @@ class Meaning:
                 return Fraction(one) / other if other else self.without_value(term)
             case t.Operation(operator=name, arguments=arguments):
                 given = list(map(of, arguments))
-                return self.without_value(term) if name == "sqrt" and given[0] <= -NEAR else _operation(name, given)
+                lacks = name == "sqrt" and given[0] <= -NEAR
+                lacks = lacks or (name == "atan2" and all(abs(number) < NEAR for number in given))
+                return self.without_value(term) if lacks else _operation(name, given)
         return self.unwritten(term, run, k, bound)
 
     def without_value(self, term: t.Term) -> Any:
@@ -504,6 +508,12 @@ def _operation(name: str, given: list[Any]) -> Any:
             number, digits = Fraction(max(given[0], 0)), 10**200
             exact = Fraction(isqrt(number.numerator), isqrt(number.denominator))
             return exact if exact**2 == number else Fraction(isqrt(int(number * digits**2)), digits)
+        case "sin":
+            return decimals.sine(Fraction(given[0]))
+        case "cos":
+            return decimals.cosine(Fraction(given[0]))
+        case "atan2":
+            return decimals.angle(*(Fraction(0 if abs(number) < NEAR else number) for number in given))
     raise AssertionError(f"the reference does not know {name}: describe it in {__file__}")
 
 

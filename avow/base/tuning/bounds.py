@@ -27,6 +27,9 @@ AHEAD_SIZE = 20_000
 FORMULAS_KEPT = 2_000
 """Formulas that a session of questions keeps as expressions of Z3: a node's analysis asks about a few hundred."""
 
+ROOTS_COMPARED = 5
+"""Sines, or angles, of which a solver gets facts of every two: with more, these would be most of a question."""
+
 QUESTIONS_KEPT = 500
 """Questions of evaluation to one Z3 context: what it keeps of them does not grow without end."""
 

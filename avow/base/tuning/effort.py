@@ -46,6 +46,9 @@ ROUNDS = ((0.025, 0.1), (0.1, 0.2), (0.275, 0.3))
 """Parts of the effort allowed, for the solver's own methods and for functions as tables: short rounds of different
 methods before any gets long."""
 
+CLOSER_LOOKS = 6
+"""Attempts at a question with `sin`, `cos` or `atan2`, each with bounds that are closer around the last model."""
+
 RESTARTS = 8
 """Where there are functions, the solver's own methods find a contradiction early or by luck: before the last round as
 many further seeds have a try. One redundant clause, its question's parts in 14 orders: 3 answered by one attempt of
