@@ -32,7 +32,7 @@ from avow.calculus.derivation import Case, Phase, about_memory
 from avow.calculus.discharge import Bounds
 from avow.calculus.entailment import implied
 from avow.calculus.finder import Hint
-from avow.calculus.induction import INVARIANT, Written, further, in_words, steps
+from avow.calculus.induction import BEFORE, INVARIANT, Written, further, in_words, steps
 from avow.calculus.ltl import TooLong, violation
 from avow.calculus.model_checking import cannot_run, explored, judge_property
 from avow.calculus.questions import Answer, as_far_as_shown, certified
@@ -40,7 +40,7 @@ from avow.calculus.scenario import CannotRun
 from avow.calculus.trials import composes
 from avow.calculus.variables import Frame, Observed, framed, system_term
 from avow.evidence.record import COMPOSES
-from avow.formulas.formula import digest, negation
+from avow.formulas.formula import digest, free_variables, negation
 from avow.language.contract import Clause
 from avow.language.printer import show_term
 from avow.language.terms import FALSE, Term
@@ -126,9 +126,12 @@ class FormulaQuestion:
     def unused_support(self, used: Sequence[str], labels: Sequence[str], assumed: Mapping[str, Term]) -> str:
         """Why the proof of a formula uses no guarantee, or none that the plan names as its support; otherwise empty."""
         needed = {label.removesuffix(" one step before") for label in labels} - {self.name}
-        if needed and not used and needed <= assumed.keys():
-            alone = ", ".join(sorted(needed))
-            return f"the formula follows from the assumptions alone, whatever the nodes guarantee: {alone}"
+        if not used and not self.likely and needed <= assumed.keys():
+            if needed:
+                alone = ", ".join(sorted(needed))
+                return f"the formula follows from the assumptions alone, whatever the nodes guarantee: {alone}"
+            if not _about_links(frame, frame.required[self.name]):
+                return "the formula is a tautology over steps: it holds whatever the nodes do"
         if used and self.support and set(used).isdisjoint(self.support):
             return f"it needs none of the guarantees that supported_by names, but {', '.join(used)}: name these"
         return ""
@@ -359,6 +362,12 @@ def _every_guarantee(frame: Frame) -> tuple[str, ...]:
 def _guarantees(frame: Frame, labels: tuple[str, ...]) -> list[str]:
     known = frozenset(_every_guarantee(frame))
     return [name for name in dict.fromkeys(label.removesuffix(" one step before") for label in labels) if name in known]
+
+
+def _about_links(frame: Frame, formula: Term) -> bool:
+    """Whether the formula speaks of two ports with values of one source."""
+    sources = {v.name.removesuffix(BEFORE) for v in free_variables(system_term(frame, formula))}
+    return len(sources) < len(free_variables(formula))
 
 
 def _meaning(formula: Property) -> str:

@@ -43,6 +43,7 @@ def main(path: str) -> None:
         elif not answer["holds"]:
             wrong = [each["kept"] not in own and (not each["given"] or each["given"] in own) for own in labels]
             answer["run"] = _run(choices, initial, wrong)
+        answer["unmet"] = [when for when in each["whens"] if not any(when in own for own in labels)]
         answers.append(answer)
     shown = {state for answer in answers for state in answer.get("run", ())}
     shown |= {answer["state"] for answer in answers if "state" in answer}
@@ -60,11 +61,7 @@ def _worst(choices: Any, labels: Any, given: str, kept: str) -> dict[str, Any]:
             met = sum((p for to, p in choice if kept in labels[to]), Fraction(0))
             if among and met / among < worst:
                 worst, at = met / among, state
-    return {
-        "worst": str(worst),
-        "met": any(given in own for own in labels),
-        **({"state": at} if at is not None else {}),
-    }
+    return {"worst": str(worst), **({"state": at} if at is not None else {})}
 
 
 def _run(choices: Any, initial: list[int], wrong: list[bool]) -> list[int]:

@@ -44,6 +44,7 @@ def settle(job: Job, given: Given, folder: Path, limits: Limits, version: str) -
             "given": each.given,
             "kept": each.kept,
             "least": str(each.least or ""),
+            "whens": list(each.whens),
         }
         for each in made.asked
     ]
@@ -105,11 +106,13 @@ def _outcome(
     text = f"{count(size, 'state')}: {text}"
     bound["probability"] = str(number)
     if holds:
-        vacuous = asked.least is not None and not answer["met"]
+        unmet = dict.fromkeys(asked.whens[when] for when in answer["unmet"])
         rests = ("the model has the probabilities and choices of the node in its use",)
-        summary = f"{text}; no state meets what is given" if vacuous else text
+        summary = f"{text}; no state meets {' or '.join(unmet)}" if unmet else text
         details: dict[str, object] = {} if chance is None else {LIKELY: str(chance.least)}
-        return Outcome(name, Verdict.CHECKED, summary, bound=bound, hypotheses=rests, vacuous=vacuous, details=details)
+        return Outcome(
+            name, Verdict.CHECKED, summary, bound=bound, hypotheses=rests, vacuous=bool(unmet), details=details
+        )
     return Outcome(name, Verdict.REFUTED, text, _counterexample(clause, answer, first, states, number), bound=bound)
 
 

@@ -7,10 +7,11 @@ with probability p or more under the condition that it meets what is given.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 
+from avow.formulas.conditions import conditions
 from avow.language import sorts as s
 from avow.language import terms as t
 from avow.language.contract import Clause
@@ -38,6 +39,8 @@ class Asked:
     given: str
     kept: str
     least: Fraction | None = None
+    whens: Mapping[str, str] = field(default_factory=dict)
+    """A label for each condition under which the guarantee demands something, and the condition in RCL."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,7 +70,8 @@ def written(given: Given, clauses: Iterable[Clause], assumptions: Iterable[Claus
         try:
             if chance is None or chance.per_run:
                 lines.append(f'label "{name}" = {say(clause.spoken)};')
-                asked.append(_always(name, name, least, None if chance is None else chance.least))
+                always = _always(name, name, least, None if chance is None else chance.least)
+                asked.append(replace(always, whens=_whens(clause, say, lines)))
                 continue
             condition, claim, p = say(chance.given), say(chance.claim), chance.least
         except NoCounterpart as part:
@@ -80,8 +84,22 @@ def written(given: Given, clauses: Iterable[Clause], assumptions: Iterable[Claus
         first = f'filter(forall, !"{at}" | "{kept}", "init")'
         asked.append(Asked(f"{name}_first", first, "", at, kept))
         reward = f'R{{"{name}"}}{least}'
-        asked.append(Asked(name, f"filter(forall, {reward}>=1 [ I=1 ], true)", f"{reward}=? [ I=1 ]", at, kept, p))
+        prop = f"filter(forall, {reward}>=1 [ I=1 ], true)"
+        whens = {at: show_term(chance.given)} | _whens(clause, say, lines)
+        asked.append(Asked(name, prop, f"{reward}=? [ I=1 ]", at, kept, p, whens))
     return Written(given.text.rstrip() + "\n\n// from the contract\n" + "\n".join(lines) + "\n", tuple(asked), refused)
+
+
+def _whens(clause: Clause, say: Callable[[t.Term], str], lines: list[str]) -> dict[str, str]:
+    """Writes the labels of the conditions into `lines`; not of a condition without a counterpart."""
+    found = {}
+    for k, each in enumerate(conditions(clause.spoken)):
+        try:
+            lines.append(f'label "{label(clause.name)}_when{k}" = {say(each.formula)};')
+        except NoCounterpart:
+            continue
+        found[f"{label(clause.name)}_when{k}"] = show_term(each.formula)
+    return found
 
 
 def label(clause: str) -> str:

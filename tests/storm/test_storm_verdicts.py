@@ -145,6 +145,7 @@ module n
 endmodule
 """
 HALF = "with probability >= 0.5 given ( in.p ) ( out.d )"
+HALF_BACK = "with probability >= 0.5 given ( out.d ) ( in.p )"
 
 
 @pytest.mark.parametrize(
@@ -157,11 +158,16 @@ HALF = "with probability >= 0.5 given ( in.p ) ( out.d )"
         (HALF, {}, "assume a ( not in.p )", Verdict.UNKNOWN, "an assumption is broken"),
         (HALF, {}, "assume a ( in.k == 0 and in.m == idle )", Verdict.CHECKED, ""),
         ("with probability >= 0.5 given ( in.m == go ) ( out.d )", {}, "", Verdict.CHECKED, "no state meets"),
+        (HALF_BACK, {"(d'=true)": "(d'=false)"}, "", Verdict.CHECKED, "no state meets"),
+        ("with probability >= 0.5 ( in.m == go -> out.d )", {}, "", Verdict.CHECKED, "no state meets"),
+        ("with probability >= 0.5 given ( in.p ) ( in.m == go -> out.d )", {}, "", Verdict.CHECKED, "no state meets"),
+        ("with probability >= 0.5 per run ( in.m == go -> out.d )", {}, "", Verdict.CHECKED, "no state meets"),
+        ("( in.m == go -> out.d )", {}, "", Verdict.CHECKED, "no state meets"),
         ("( forall(x in INTEGER | x * x >= 0) or out.d )", {}, "", Verdict.UNKNOWN, "PRISM has no counterpart"),
         ("( max(in.k, 1) == 1 and in.k + 1 > 0 and in.m in {idle} )", {}, "", Verdict.CHECKED, "with probability 1"),
         ("( once(in.p) )", {}, "", Verdict.UNKNOWN, "single steps"),
     ],
-)
+)  # fmt: skip
 def test_verdicts(
     tmp_path: Path, clause: str, change: Mapping[str, str], assume: str, verdict: Verdict, says: str
 ) -> None:
