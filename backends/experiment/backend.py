@@ -14,7 +14,7 @@ from avow.base.codes import Catalogue
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.files import inside
 from avow.base.tools import onnxruntime_tool
-from avow.base.verdict import Link, Object, Outcome, Verdict
+from avow.base.verdict import Link, Object, Verdict
 from avow.language.contract import Clause, Node
 
 from .campaign import NotMade, drawn, experiment, recorded, regressions
@@ -113,9 +113,6 @@ class ExperimentBackend(Backend):
             return Report.alike(job, Verdict.ERROR, why, "avow experiment", self.version)
         outcomes, logs = [], {}
         for o in job.obligations:
-            if campaign is not None and job.clause(o).chance is not None:
-                outcomes.append(Outcome(o.id, Verdict.UNKNOWN, _MONITORS))
-                continue
             outcome, logs[f"{o.name}.tsv"] = settle(o.name, found, job.kept.get(o.id, ()))
             # the meaning of a part of the contract in terms of columns is a person's judgement
             link = Link.GUIDED if found.claims[o.name].interpreted else self.link
@@ -123,9 +120,6 @@ class ExperimentBackend(Backend):
             outcomes.append(replace(outcome, obligation=o.id, link=link, of=of))
         beyond = contradictions(job, found) if campaign is None else of_campaign(job, campaign, found)
         return Report(tuple(outcomes), "avow experiment", self.version, logs=logs, contradicted=tuple(beyond))
-
-
-_MONITORS = "the monitors of a campaign judge no probability: give a table of steps under 'data', without 'campaign'"
 
 
 def _campaign(job: Job) -> Campaign | None:

@@ -273,4 +273,5 @@ def _claim(job: Job, name: str, made: Sequence[Made]) -> Claim:
     names = [known[n].name if len(known) == count else f"condition {n + 1}" for n in range(count)]
     unseen = tuple(sorted({name for one in made for name in one.unseen}))
     conditions = tuple(Formula(text, TRUE, None) for text in names)
-    return Claim(Formula.of(clause), conditions, None, (), unseen, (), frozenset(), False, (), None, ())
+    own = Formula.of(clause)
+    return Claim(own, conditions, None, (), unseen, (), frozenset(), False, (), None, (), clause.chance)

@@ -79,7 +79,7 @@ def _outcome(claim: Claim, found: Sequence[tuple[Run, Judged]], experiment: Expe
     at_least, chance = experiment.at_least, claim.chance
     if chance is not None:
         at_least = chance.least
-        if why := _unlike(claim, experiment):
+        if why := _MONITORS if experiment.replayed is not None else _unlike(claim, experiment):
             return replace(outcome, summary=why)
     claimed = at_least is not None and sample.bound <= 1 - at_least
     if sample.failed and not claimed and (chance is None or sample.refutes(chance.least)):
@@ -119,6 +119,7 @@ def _unlike(claim: Claim, experiment: Experiment) -> str:
     return "the guarantee has a probability per run, and each row is one step: the rows of a run need 'steps: true'"
 
 
+_MONITORS = "the monitors of a campaign judge no probability: give a table of steps under 'data', without 'campaign'"
 _DRAWN = "the runs are independent and drawn as the robot will be used"
 _SIMULATED = "the robot is used as the campaign's scenario says, and behaves as in the simulator"
 

@@ -159,7 +159,7 @@ class Recording:
         if node.name in self.played:
             return
         for clause in node.guarantees:
-            if clause.unwritten:
+            if clause.unwritten or clause.chance is not None:
                 continue
             claim = claims.get(clause.name, f"{node.name}/{Kind.GUARANTEE}/{clause.name}")
             spoken = frozenset(v.qualified for v in free_variables(clause.formula))

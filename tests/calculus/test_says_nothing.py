@@ -51,6 +51,7 @@ def asked(folder: Path, what: str) -> Outcome:
         ('formula: "sensor.r >= 10 -> brake.on", supported_by: [brake.idle]', "needs none of the guarantees"),
         ('temporal: "always (brake.on or not brake.on)"', "holds of every run, whatever the nodes do"),
         ('temporal: "eventually (0 <= sensor.r)"', "holds of every run, whatever the nodes do"),
+        ('temporal: "always (sensor.r <= 20)"', "speaks of the environment alone"),
         ('temporal: "(eventually brake.on) or always not brake.on"', "holds of every run, whatever the nodes do"),
         ('temporal: "always (sensor.level == 2 -> eventually brake.on)"', "never comes about on any run"),
         ('temporal: "always (sensor.level == 2 -> brake.on)"', "never comes about on any run"),
@@ -80,6 +81,7 @@ def test_what_every_design_meets_is_no_requirement(tmp_path: Path, what: str, wh
         'temporal: "always (sensor.r >= 10 -> brake.on)"',
         'temporal: "always not (brake.on and sensor.r < 10)"',
         'temporal: "always (sensor.level == 1 -> brake.on)"',
+        'temporal: "always (brake.in.level <= 1)"',
     ],
 )
 def test_what_some_design_would_break_is_one(tmp_path: Path, what: str) -> None:
@@ -101,3 +103,10 @@ def test_a_proof_names_the_guarantees_that_it_uses_beyond_the_plans(tmp_path: Pa
     outcome = asked(tmp_path, f'formula: "sensor.r >= 10 -> brake.on", supported_by: {support}')
     assert (outcome.verdict, outcome.vacuous) == (Verdict.PROVED, False)
     assert outcome.summary.partition("; ")[2] == told
+
+
+def test_a_property_of_a_delayed_value_is_about_the_node_that_gave_it(tmp_path: Path) -> None:
+    wiring = "connections: [{{from: sensor.level, to: brake.level, delayed: true, initial: out.level == 0}}]\n"
+    what = 'temporal: "always (brake.in.level <= 1)"'
+    outcome = outcomes(make(tmp_path, RCL, (wiring + PLAN).format(what)))["R"]
+    assert (outcome.verdict, outcome.vacuous) == (Verdict.CHECKED, False), outcome.summary

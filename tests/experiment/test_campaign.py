@@ -105,6 +105,16 @@ def test_drawn_runs_are_trials_up_to_the_number_needed(drawn: Path) -> None:
     assert not BACKEND.check(job(drawn))
 
 
+def test_no_campaign_shows_a_probability_nor_says_so(tmp_path: Path) -> None:
+    root = made(tmp_path / "chance")
+    chance = "  guarantee often with probability >= 0.5 per run ( in.speed >= 1 -> out.distance <= 4 )\n}"
+    edit(root / "system.rcl", ("4 )\n}", "4 )\n" + chance))
+    edit(root / "plan.yaml", ("runs: 20", "runs: 14"))
+    assert "brake.often: unknown: the monitors of a campaign judge no probability" in campaign(root, code=1)
+    found = {o.obligation: o.verdict for o in BACKEND.discharge(job(root), root, Limits()).outcomes}
+    assert [*found.values()] == [Verdict.TESTED, Verdict.UNKNOWN]
+
+
 @pytest.mark.slow
 def test_the_same_seed_gives_the_same_table_also_in_parts(drawn: Path) -> None:
     table = (drawn / "data/runs.csv").read_text()
