@@ -103,7 +103,7 @@ class FormulaQuestion:
         listed = answer.details.get("needed")
         labels = tuple(map(str, listed)) if isinstance(listed, list) else ()
         used = _guarantees(frame, labels)
-        if why := why or self.unused_support(used, labels, assumed):
+        if why := why or self.unused_support(frame, used, labels, assumed):
             return _says_nothing(answer, why)
         unnamed = [name for name in used if self.support and name not in self.support]
         told = f"; `supported_by` does not name {', '.join(unnamed)}: add what it rests on" if unnamed else ""
@@ -123,7 +123,9 @@ class FormulaQuestion:
                 return f"its condition never comes about: {show_term(trigger)} is excluded: {answer.summary}"
         return ""
 
-    def unused_support(self, used: Sequence[str], labels: Sequence[str], assumed: Mapping[str, Term]) -> str:
+    def unused_support(
+        self, frame: Frame, used: Sequence[str], labels: Sequence[str], assumed: Mapping[str, Term]
+    ) -> str:
         """Why the proof of a formula uses no guarantee, or none that the plan names as its support; otherwise empty."""
         needed = {label.removesuffix(" one step before") for label in labels} - {self.name}
         if not used and not self.likely and needed <= assumed.keys():
