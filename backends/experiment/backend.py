@@ -17,7 +17,7 @@ from avow.base.tools import onnxruntime_tool
 from avow.base.verdict import Link, Object, Verdict
 from avow.language.contract import Clause, Node
 
-from .campaign import NotMade, drawn, experiment, recorded, regressions
+from .campaign import NotMade, drawn, experiment, monitored, recorded, regressions
 from .further import contradictions, of_campaign
 from .network import Missing
 from .options import SCHEMA, read
@@ -58,6 +58,7 @@ class ExperimentBackend(Backend):
             if (campaign := _campaign(job)) is None:
                 read(job)
             else:
+                monitored(job, campaign)
                 experiment(job, (), ())  # the options of the claim
                 regressions(campaign)
                 drawn(campaign)

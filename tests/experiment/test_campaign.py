@@ -353,6 +353,9 @@ def test_a_plan_without_campaign_monitors_or_program_is_told(tmp_path: Path) -> 
     text = (root / "plan.yaml").read_text()
     (root / "plan.yaml").write_text(text[: text.index("      - ros")] + text[text.index("      - exp") :])
     assert "has no monitors" in campaign(root, code=2)
+    done = avow("check", str(root), cwd=root)
+    assert done.returncode == 2
+    assert "has no monitors" in done.stdout + done.stderr
 
 
 # -- the rover of docs/examples: page 23's acceptance ------------------------------------------------------------------
