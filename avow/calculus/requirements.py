@@ -105,7 +105,8 @@ class FormulaQuestion:
         used = _guarantees(frame, labels)
         if why := why or self.unused_support(frame, used, labels, assumed):
             return _says_nothing(answer, why)
-        unnamed = [name for name in used if self.support and name not in self.support]
+        inside = _inside(composition, self.name)
+        unnamed = [n for n in used if self.support and n not in self.support and n.partition(".")[0] not in inside]
         told = f"; `supported_by` does not name {', '.join(unnamed)}: add what it rests on" if unnamed else ""
         return replace(answer, summary=answer.summary + told)
 
@@ -347,6 +348,13 @@ def supports(composition: Composition, requirement: Requirement) -> tuple[str, .
             nodes = (owner,)
         found.update({f"{n}.{g.name}": None for n in nodes for g in composition.frame.node(n).guarantees})
     return tuple(found)
+
+
+def _inside(composition: Composition, requirement: str) -> frozenset[str]:
+    """The nodes of the derivations that a requirement names as its support."""
+    wanted = (r.supported_by for r in composition.frame.system.plan.requirements if r.id == requirement)
+    named = {name for names in wanted for name in names}
+    return frozenset(n for g in composition.goals if g.name in named for n in composition.leaves(g, g.nodes))
 
 
 def formula_question(frame: Frame, name: str, support: tuple[str, ...]) -> FormulaQuestion:

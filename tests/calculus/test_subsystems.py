@@ -254,7 +254,8 @@ def test_a_derivation_is_support_as_the_nodes_are_whose_guarantees_it_derives(tm
     told = outcomes(make(tmp_path, CONTEXT + READER + GRADER + SOURCE, plan))["R"]
     assert told.verdict is Verdict.PROVED
     needed = "reader.scaled, grader.grade, source.small"
-    assert told.summary == f"follows at every step from {needed}"
+    unnamed = "" if support == "front" else "; `supported_by` does not name reader.scaled: add what it rests on"
+    assert told.summary == f"follows at every step from {needed}{unnamed}"
 
 
 def test_environment_assumptions_reach_into_subsystems(tmp_path: Path) -> None:
