@@ -75,7 +75,9 @@ class RateView:
             return f"{NO_RATE}, as {self.lacks}"
         if len(self.leaves) < 2:
             return f"failure rate: {self.brief} ({_TRIALS[self.trial]})"
-        how = f"union bound over {len(self.leaves)} sampled claims, joint confidence by Bonferroni"
+        drawn = sum(bool(leaf.strata) for leaf in self.leaves)
+        how = f"union bound over {len(self.leaves)} claims, {drawn} of them sampled"
+        how += ", joint confidence by Bonferroni" if drawn > 1 else ""
         return f"failure rate: {self.brief} ({how}; {_TRIALS[self.trial]})"
 
 

@@ -167,6 +167,9 @@ class SolverResult:
 BOUNDED = "the solver has a model, but knows only bounds of `sin`, `cos` and `atan2`"
 """The model may be none; it counts if it is replayed, with closer bounds at its values."""
 
+BOUNDED_HANGS = 6
+"""Questions with these terms hang so many times sooner: Z3 counts few steps of its algebraic numbers."""
+
 HANGS = "the solver hangs"
 
 
@@ -178,7 +181,8 @@ def put(translator: Translator, solver: Any, effort: float, seed: int | None = 0
     if translator.session.roots:  # reading the assertions copies them, which costs time and can change the answer
         roots = translator.root_facts(solver.assertions())
         solver.add(*translator.facts_of(roots))
-        bounded = any(root.is_bounded for root in roots)
+        if bounded := any(root.is_bounded for root in roots):
+            solver.set(timeout=net(effort) // BOUNDED_HANGS)
     result = solver.check(*assumptions)
     charge(translator, solver)
     if result == z3.sat:
