@@ -69,10 +69,12 @@ class Workspace:
         return tuple(sorted(p for p in self.contracts.iterdir() if os.path.lexists(p / "plan.yaml")))
 
     def stray_plans(self) -> tuple[Path, ...]:
-        """The plans under contracts/ that are in no system's folder, one of each folder."""
+        """The plans under contracts/ that are in no system's folder, one of each folder, and the contracts of folders
+        without a plan."""
         held = set(self.systems())
-        found = (path for path in plans_within(self.contracts) if held.isdisjoint(path.parents))
-        return tuple({path.parent: path for path in found}.values())
+        found = [path for path in plans_within(self.contracts) if held.isdisjoint(path.parents)]
+        bare = (p for p in sorted(self.contracts.glob("*/*.rcl")) if p.parent not in held)
+        return tuple(({path.parent: path for path in bare} | {path.parent: path for path in found}).values())
 
     def relative(self, path: Path) -> str:
         """A path as records and reports show it: relative to the workspace, where it lies within."""
@@ -163,7 +165,9 @@ def require_systems(place: Workspace, names: Iterable[str]) -> tuple[str, ...]:
     found = tuple(name_of(place, name) for name in names)
     for name in found:
         if name not in known:
-            raise Rejected(Diagnostic("CLI002", f"there is no system '{name}'", hint=suggest(*_typed(name, known))))
+            hint = f"write its plan.yaml in {place.contracts / name}" if (place.contracts / name).is_dir() else None
+            hint = hint or suggest(*_typed(name, known))
+            raise Rejected(Diagnostic("CLI002", f"there is no system '{name}'", hint=hint))
     return found
 
 

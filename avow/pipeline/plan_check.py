@@ -91,9 +91,12 @@ def not_verified(path: Path, around: str = "", severity: Severity = Severity.ERR
     """The warning about a plan that no run reads; `around`: the system whose folder it is in."""
     why = f"'{around}' does not take it in" if around else "its folder is not one of contracts/ itself"
     hint = "move its folder into contracts/, or take it in under `subsystems` of another plan"
-    if path.name != "plan.yaml":
+    what = "contract" if path.suffix == ".rcl" else "plan"
+    if what == "contract":
+        why, hint = "there is no plan.yaml beside it", "write one, or move the contract to a system's folder"
+    elif path.name != "plan.yaml":
         why, hint = "a plan's file is called plan.yaml", "rename it, or remove it"
-    return Diagnostic("CLI021", f"this plan is not verified: {why}", Span(str(path), 1, 1, 1, 1), severity, hint)
+    return Diagnostic("CLI021", f"this {what} is not verified: {why}", Span(str(path), 1, 1, 1, 1), severity, hint)
 
 
 def of_rest(folder: Path) -> tuple[Diagnostic, ...]:

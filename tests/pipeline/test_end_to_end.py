@@ -226,6 +226,13 @@ def test_a_plan_below_another_is_told(begun: Path, tmp_path: Path) -> None:
     assert "CLI021" not in verify(robot, "check").stderr
 
 
+def test_a_contract_without_a_plan_is_no_green_run(robot: Path) -> None:
+    (robot / "contracts" / "thermostat" / "plan.yaml").unlink()
+    for done in (verify(robot), avow("verify", "thermostat", cwd=robot)):
+        assert done.returncode == 2, done.stdout
+        assert "plan.yaml" in done.stderr
+
+
 @pytest.mark.slow
 def test_a_plan_in_no_systems_folder_is_an_error(begun: Path, tmp_path: Path) -> None:
     robot = Path(shutil.copytree(begun, tmp_path / "robot"))
