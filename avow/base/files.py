@@ -103,8 +103,11 @@ def _digest_as(path: Path, mark: tuple[int | str, ...]) -> str:
 
 
 def write_out(path: Path, content: str) -> None:
-    """Write `content` to the user's path: as `write`, but a device or a pipe is not replaced. Raises OSError."""
-    if path.exists() and not path.is_file() and not path.is_dir():
+    """Write `content` to the user's path: as `write`, but a device or a pipe is not replaced. Raises OSError, also for
+    a folder."""
+    if path.is_dir():
+        raise IsADirectoryError(errno.EISDIR, "this is a folder: name a file", str(path))
+    if path.exists() and not path.is_file():
         path.write_text(content, "utf-8")
     else:
         write(path, content)

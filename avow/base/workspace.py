@@ -141,6 +141,7 @@ def system_folder(name: str) -> Path:
 
 def _typed(name: str, known: Iterable[str]) -> tuple[str, list[str]]:
     """What was typed, and the known systems as they would be typed in its place: by name, or by folder."""
+    name = str(Path(name).parent) if Path(name).is_file() else name
     above, _, last = name.rstrip("/").rpartition("/")
     return (name.rstrip("/"), [f"{above}/{each}" for each in known]) if above else (last, list(known))
 

@@ -19,7 +19,7 @@ from avow.isolation.outside import Outside
 from .clang_tool import fuzzes, tools
 from .reading import Reading
 from .tables import TABLES, Drawable, native, tables
-from .tuning import BUILD_MEGABYTES, BUILD_SECONDS
+from .tuning import BUILD_MEGABYTES, BUILD_SECONDS, FIRST_BUILD_SECONDS
 from .unseen import Line, Unseen, own, undefined, unseen
 
 LINK = "avow-adapter.hpp"
@@ -73,7 +73,11 @@ _FLAGS = {
 
 
 class NotBuilt(Exception):  # noqa: N818 - it names what happened
-    """The compiler rejects the source; the message is its first error."""
+    """The compiler rejects the source, and the message is its first error; or (`late`) it did not end."""
+
+    def __init__(self, why: str, late: bool = False) -> None:
+        super().__init__(why)
+        self.late = late
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,7 +114,7 @@ def _preprocessed(
         words = [*_COMMON, *flags, *_includes(reading, folder), "-E", str(source)]
         done = _clang(_there(), words, folder, outside, seconds)
         if done.code != 0:
-            raise NotBuilt(_first(done, reading, folder))
+            raise NotBuilt(_first(done, reading, folder), done.timed_out)
         lines += own(done.stdout, folder, reading.adapter)
     return lines
 
@@ -148,13 +152,13 @@ def build(name: Build, reading: Reading, folder: Path, outside: Outside, seconds
         words = [*_COMMON, *flags, *_includes(reading, folder), "-MD", "-MF", str(listed)]
         done = _clang(tool, [*words, "-c", str(source), "-o", str(object_file)], folder, outside, seconds)
         if done.code != 0 or not object_file.is_file():
-            raise NotBuilt(_first(done, reading, folder))
+            raise NotBuilt(_first(done, reading, folder), done.timed_out)
         objects.append(str(object_file))
         read += _listed(listed, folder)
     program = folder / name
     done = _clang(tool, [*flags, *objects, "-o", str(program), "-lpthread"], folder, outside, seconds)
     if done.code != 0 or not program.is_file():
-        raise NotBuilt(_first(done, reading, folder))
+        raise NotBuilt(_first(done, reading, folder), done.timed_out)
     try:
         asked = tuple(dict.fromkeys(n for o in objects for n in undefined(read_regular(Path(o)))))
     except ValueError as error:
@@ -167,8 +171,8 @@ def _clang(tool: Tool, words: list[str], folder: Path, outside: Outside, seconds
         limit = max(5.0, min(seconds, BUILD_SECONDS))
         return outside.run([str(tool.path), *words], cwd=folder, seconds=limit, megabytes=BUILD_MEGABYTES)
     kept = {f"ZIG_{which}_CACHE_DIR": str(_wheel_cache()) for which in ("GLOBAL", "LOCAL")}
-    # its first run builds the standard library: a minute of processor time
-    return outside.run([str(tool.path), "c++", *words], cwd=folder, seconds=max(5.0, seconds), env=kept)
+    limit = max(FIRST_BUILD_SECONDS, seconds)
+    return outside.run([str(tool.path), "c++", *words], cwd=folder, seconds=limit, env=kept)
 
 
 def _wheel_cache() -> Path:
@@ -179,7 +183,7 @@ def _wheel_cache() -> Path:
 def _first(done: Completed, reading: Reading, folder: Path) -> str:
     """The compiler's first error, with a place that is the same on every machine."""
     if done.timed_out:
-        return "the compiler did not end in the time given"
+        return "the compiler did not end in time: run it again on a machine with less to do, or allow more `seconds`"
     lines = [line for line in done.stderr.splitlines() if "error:" in line or "undefined reference" in line]
     text = (lines or done.stderr.strip().splitlines() or [f"the compiler ended with code {done.code}"])[0]
     name, missing = reading.adapter.name, ""

@@ -77,13 +77,11 @@ def settle(job: Job, limits: Limits) -> Report:
         try:
             outcomes = work.outcomes()
         except NotBuilt as error:
-            outcomes = work.alike(Verdict.ERROR, f"it cannot be compiled: {error}")
+            outcomes = work.alike(Verdict.ERROR, f"it cannot be compiled: {error}", again=error.late)
         except Misused as error:
             outcomes = work.alike(Verdict.ERROR, str(error))
         except Unanswered as error:
-            outcomes = work.alike(error.verdict, str(error))
-            if error.silent:
-                outcomes = tuple(replace(o, details={RETRY: True}) for o in outcomes)
+            outcomes = work.alike(error.verdict, str(error), again=error.silent)
         except ToolMissing as missing:
             outcomes = work.alike(Verdict.NOT_RUN, str(missing))
     what = {"of": Object.BINARY, "numbers": reading.source.numbers.value}
@@ -120,8 +118,10 @@ class Work:
     def job(self) -> Job:
         return self.reading.job
 
-    def alike(self, verdict: Verdict, summary: str) -> tuple[Outcome, ...]:
-        return tuple(Outcome(o.id, verdict, summary) for o in self.job.every)
+    def alike(self, verdict: Verdict, summary: str, *, again: bool = False) -> tuple[Outcome, ...]:
+        """`again`: the next run asks again."""
+        details: dict[str, object] = {RETRY: True} if again else {}
+        return tuple(Outcome(o.id, verdict, summary, details=details) for o in self.job.every)
 
     def outcomes(self) -> tuple[Outcome, ...]:
         reading = self.reading
@@ -134,6 +134,7 @@ class Work:
                 built[wanted] = building.build(wanted, reading, self.folder, self._outside, self._left())
             asked = built[Build.PLAIN].asked
             unseen = building.looked_into(reading, self.folder, self._outside, asked, self._left())
+            self._spent = self._spent if fuzzed else Stopwatch()  # the wheel's first build takes a minute
         finally:  # also if the build fails: it may succeed once a library is installed
             self.observed.update(dict.fromkeys(building.observed(reading, tuple(built.values()), self._outside)))
         program = built[Build.PLAIN].program

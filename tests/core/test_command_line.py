@@ -11,6 +11,8 @@ import click
 import pytest
 from click.testing import CliRunner
 
+from avow.base.diagnostics import Rejected
+from avow.base.workspace import Workspace, require_systems
 from avow.cli import COMMANDS, command, main
 
 ROOT = Path(__file__).parents[2]
@@ -163,6 +165,9 @@ def test_check_says_which_systems_there_are(place: Path) -> None:
     assert "known: n" in done.output
     done = CliRunner().invoke(LEAVES["check"], ["contracts/N"], standalone_mode=False)
     assert "did you mean `contracts/n`?" in done.output
+    with pytest.raises(Rejected) as refused:
+        require_systems(Workspace(place), ["contracts/n/n.rcl"])
+    assert refused.value.diagnostics[0].hint == "known: contracts/n"
 
 
 def test_the_table_of_exit_codes_is_in_one_place() -> None:

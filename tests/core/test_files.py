@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from pathlib import Path
 
 import pytest
@@ -50,6 +51,12 @@ def test_a_pipe_in_a_file_s_place_is_replaced(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "a")
     assert files.write(tmp_path / "a", "x")
     assert (tmp_path / "a").read_text() == "x"
+
+
+def test_a_folder_is_no_place_for_a_text(tmp_path: Path) -> None:
+    with pytest.raises(IsADirectoryError, match=re.escape(f"this is a folder: name a file: '{tmp_path}'")):
+        files.write_out(tmp_path, "x")
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_what_goes_where_the_user_asked_for_it_goes_into_a_pipe(tmp_path: Path) -> None:

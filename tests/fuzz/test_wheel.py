@@ -8,8 +8,12 @@ from pathlib import Path
 import pytest
 
 from avow.backends.fuzz import BACKEND, clang_tool
+from avow.backends.fuzz.tuning import FIRST_BUILD_SECONDS
+from avow.base.process import Completed
 from avow.base.tools import Tool
 from avow.base.verdict import Verdict
+from avow.evidence.record import RETRY
+from avow.isolation.outside import Outside
 from fuzz.cpp_nodes import LIMITER, Cpp, adapter
 
 pytestmark = [
@@ -59,3 +63,17 @@ def test_a_clock_that_is_read_is_found(tmp_path: Path) -> None:
     found = cpp.outcomes(tmp_path)
     assert "it uses the clock" in found["same"].summary
     assert found["same"].verdict is Verdict.UNKNOWN
+
+
+def test_a_build_that_does_not_end_is_tried_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its first run builds the standard library, which `seconds` do not count."""
+    given: list[float] = []
+
+    def late(*words: object, seconds: float, **more: object) -> Completed:
+        given.append(seconds)
+        return Completed((), None, "", "", seconds)
+
+    monkeypatch.setattr(Outside, "run", late)
+    found = LIMITER.outcomes(tmp_path)
+    assert min(given) >= FIRST_BUILD_SECONDS
+    assert {(o.verdict, o.details.get(RETRY)) for o in found.values()} == {(Verdict.ERROR, True)}
