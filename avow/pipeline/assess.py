@@ -7,7 +7,7 @@ import json
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from datetime import UTC, datetime
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 from doit.exceptions import TaskError
@@ -164,7 +164,7 @@ def build(state: State, surveyed: Survey, basis: _Basis, audited: bool = True) -
             today=today(),
             run=RunInfo(
                 state.run.id,
-                datetime.now(UTC).isoformat(timespec="seconds"),
+                (datetime.now(UTC) - timedelta(seconds=state.run.seconds)).isoformat(timespec="seconds"),
                 round(state.run.seconds, 1),
                 __version__,
                 state.run.fresh,

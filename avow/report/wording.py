@@ -21,6 +21,7 @@ from avow.assurance.model import Case, EvidenceView, ObligationView, Requirement
 from avow.assurance.naming import cut
 from avow.base.codec import plain
 from avow.base.files import sha256
+from avow.base.percent import at_most
 from avow.base.plain import count, listed
 from avow.base.remembered import by_identity
 from avow.base.tuning.shown import DETAILS, FORMULA_COLUMNS, HAZARD_CHARACTERS
@@ -254,6 +255,8 @@ def _one_bound(name: str, value: Any) -> str:
             return f"for each {' and '.join(map(str, names))}"
         case "properties" | "states" | "transitions", int() if not isinstance(value, bool):
             return f"{_plain(value)} {name if value != 1 else _SINGULAR[name]}"
+        case str(), float() if "failure" in name:
+            return f"{name.replace('_', ' ')} {at_most(value)}"
         case _:  # bounds of any method, by the method's name for them
             return f"{name.replace('_', ' ')} {_plain(value)}"
 
