@@ -17,7 +17,7 @@ from avow.base.python_names import imported, inherited, top_level, unbound
 from avow.base.suggestions import did_you_mean, suggest
 from avow.ros.definitions import Message
 from avow.ros.sources import definitions
-from avow.system.plan import Driving, Plan, Source
+from avow.system.plan import Driving, NodePlan, Plan, Source
 
 _GIVES: Mapping[str, tuple[int, str, tuple[str, ...], int]] = {
     "create_subscription": (2, "callback", ("message",), 1),  # and the message's info, in newer distributions
@@ -48,6 +48,7 @@ def misused(plan: Plan) -> Iterator[Diagnostic]:
             tree = ast.parse(read_regular(path))
             faults = [*_callbacks(tree, str(path)), *_imports(tree, str(path), messages)]
             faults += source_faults(entry.source, path) if entry.source else ()
+            faults += _named(tree, plan, entry, str(path))
             yield from faults
             remedied = set(
                 re.findall(r"\w+", " ".join(re.findall("`([^`]*)`", " ".join(d.hint or "" for d in faults))))
@@ -60,6 +61,27 @@ def misused(plan: Plan) -> Iterator[Diagnostic]:
                     hint = f"write `from {packages[0]}.msg import {name.id}`"
                 message = f"`{name.id}` is not defined: the file neither imports nor assigns it"
                 yield Diagnostic("DRIVE106", message, _span(name, str(path)), Severity.WARNING, hint)
+
+
+def _named(tree: ast.Module, plan: Plan, entry: NodePlan, file: str) -> Iterator[Diagnostic]:
+    """A warning if a class of rclpy names its node otherwise than the plan, and no launch file can rename it: private
+    topics and parameters have another name on the robot."""
+    if entry.source is None or entry.source.kind is not Driving.RCLPY or plan.launched is not None:
+        return
+    placed = plan.ros.names.placed(entry.node).name
+    for declared in (d for d in tree.body if isinstance(d, ast.ClassDef) and d.name == entry.source.class_name):
+        for call in ast.walk(declared):
+            match call:
+                case ast.Call(
+                    func=ast.Attribute(value=ast.Call(func=ast.Name(id="super")), attr="__init__"),
+                    args=[ast.Constant(value=str(name)) as said, *_],
+                ) if name != placed.rpartition("/")[2]:
+                    message = f"the class names its node `{name}`, and in the plan it is {placed}"
+                    hint = f"write `ros: {{nodes: {{{entry.node}: {{name: {name}}}}}}}`, or name it alike"
+                    at = Span(file, said.lineno, said.col_offset + 1, said.lineno, (said.end_col_offset or 0) + 1)
+                    yield Diagnostic("DRIVE109", message, at, Severity.WARNING, hint)
+                case _:  # not the node's name
+                    pass
 
 
 def source_faults(source: Source, path: Path) -> tuple[Diagnostic, ...]:

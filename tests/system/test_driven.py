@@ -156,3 +156,23 @@ def test_a_message_that_its_package_does_not_have(tmp_path: Path, imported: str,
     (tmp_path / "plan.yaml").write_text(plan, "utf-8")
     blocks = [b for b in avow("check", str(tmp_path), cwd=tmp_path).stdout.split("\n\n") if "[DRIVE107" in b]
     assert [(b.partition("[")[2][:8], b.partition("help: ")[2].partition("\n")[0]) for b in blocks] == said
+
+
+@pytest.mark.parametrize(
+    ("ros", "said"),
+    [
+        ("{}", ["write `ros: {nodes: {a: {name: other}}}`, or name it alike"]),
+        ("{nodes: {a: {name: /left/other}}}", []),
+        ("{launch: [a.launch]}", []),
+    ],
+)
+def test_a_class_that_names_its_node_otherwise(tmp_path: Path, ros: str, said: list[str]) -> None:
+    (tmp_path / "a.launch").write_text('<launch><node pkg="p" type="a.py" name="a"/></launch>\n', "utf-8")
+    (tmp_path / "system.rcl").write_text(CONTRACT, "utf-8")
+    text = SOURCE.replace('"a"', '"other"').replace("REGISTERED", "pass").replace("METHOD", "pass")
+    (tmp_path / "a.py").write_text(text, "utf-8")
+    source = "{python: a.py, class: A, kind: rclpy}"
+    (tmp_path / "plan.yaml").write_text(f"ros: {ros}\nnodes: {{a: {{source: {source}, methods: []}}}}\n", "utf-8")
+    printed = avow("check", str(tmp_path), cwd=tmp_path).stdout
+    blocks = [block for block in printed.split("\n\n") if "[DRIVE109" in block]
+    assert [block.partition("help: ")[2].partition("\n")[0] for block in blocks] == said
