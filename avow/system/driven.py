@@ -110,13 +110,14 @@ def _imports(tree: ast.Module, file: str, messages: Callable[[], Mapping[str, Me
         package, _, kind = (node.module or "").rpartition(".")
         names = (re.fullmatch(rf"{package}/([^_]*){_FIRST[f'.{kind}']}", name, re.ASCII) for name in known)
         own = [name[1] for name in names if name]
+        calls = [f"{name}{part}" for name in own for part in ("Request", "Response") if kind == "srv"]  # of ROS 1
         if kind == "msg":  # ROS 1 has messages for the parts of an action
             parts = [
                 name.removeprefix(f"{package}/") for name in known if name.startswith(f"{package}/") and "_" in name
             ]
             own += [name.replace("_", "") for name in parts]
             own += [f"{name.removesuffix('_Goal')}Action" for name in parts if name.endswith("_Goal")]
-        if own and part.name not in (*own, "*"):
+        if own and part.name not in (*own, *calls, "*"):
             at = Span(file, part.lineno, part.col_offset + 1, part.lineno, part.col_offset + 1 + len(part.name))
             message = f"there is no {kind.replace('msg', 'message')} {package}/{part.name}"
             yield Diagnostic("DRIVE107", message, at, Severity.WARNING, suggest(part.name, own))

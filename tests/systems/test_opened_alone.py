@@ -63,10 +63,11 @@ def commands() -> dict[str, list[tuple[Path, Row]]]:
 
 
 COMMANDS = commands()
+TOOLS, EXTRAS = ("RunJPF", "rml-compiler", "dafny", "pytest", "z3"), ("Marabou", "storm")
 
 
 def tool_of(command: str) -> str:
-    return next(word for word in ("RunJPF", "rml-compiler", "dafny", "pytest", "z3") if word in command)
+    return next(word for word in (*TOOLS, *EXTRAS) if word in command)
 
 
 @pytest.fixture
@@ -84,7 +85,7 @@ def passes(command: str, row: Row, alone: Path) -> bool:
             pytest.skip("AJPF is not installed; test_every_agent_parses reads its files")
         case "rml-compiler":
             return accepted(*(alone / path for path in re.findall(r"\S+\.(?:rml|jsonl)", command)))
-        case "dafny" | "z3" as tool:
+        case "dafny" | "z3" | "Marabou" | "storm" as tool:
             if shutil.which(tool) is None:
                 pytest.skip(f"{tool} is not installed")
         case "pytest":
@@ -121,7 +122,7 @@ def files(suffix: str) -> list[Path]:
 
 
 def test_every_kind_of_file_is_there() -> None:
-    assert {tool_of(command) for command in COMMANDS} == {"RunJPF", "rml-compiler", "dafny", "pytest", "z3"}
+    assert {tool_of(command) for command in COMMANDS} - {*EXTRAS} == {*TOOLS}
 
 
 @pytest.mark.needs_dafny

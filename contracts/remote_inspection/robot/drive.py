@@ -119,7 +119,8 @@ def main():
         line = json.dumps(event(topic, at, message))
         if topic in gates:
             said.append(event(topic, at, message) | {"topic": raw(topic)})
-            new, passed = running.offer(parse_event(line))
+            new, on = running.offer(parse_event(line))
+            passed = on is not None
         else:
             new, passed = ([] if running is None else running.step(parse_event(line))), True
         if passed:
