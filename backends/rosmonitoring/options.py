@@ -446,8 +446,7 @@ class _Work:
         return None if scenario is None else scenario.interpreted(self.node.name, port)
 
     def scenario(self, port: Port) -> Rule:
-        found = self.interpretation(port)
-        if found is None or not isinstance(port.sort, FunctionSort):
+        if (found := self.interpretation(port)) is None or not isinstance(port.sort, FunctionSort):
             raise observing.Wrong("the plan's scenario does not interpret it", "scenario")
         table, columns = observing.named_table(self.system.plan, found[0], "scenario"), found[1]
         entry = self.mapping().get(port.variable.qualified)

@@ -109,7 +109,7 @@ def test_codes_without_example_are_few() -> None:
         ("stat == réd", "RCL107"),
         ("rose(in.both) -> within[in.k steps](stat == red)", r"RCL323 `in.k` is no limit.* \[write the number"),
         ("once[in.r](in.both)", "RCL323"),
-        ("once[sqrt(4) s](in.both)", r"RCL323 `sqrt.4.` is no limit: .* by `\+ - \* /` only \[write the num"),
+        ("once[sqrt(2) s](in.both)", r"RCL323 `sqrt.2.` is no limit: .* by `\+ - \* /` only \[write the num"),
         ("forall(i in NATURAL | held[i steps](in.both))", "RCL323"),
         ("in.both since[< (Limit - 4) s] stat == red", "RCL323 `.Limit - 4.` is no limit: it is a number from 0"),
     ],

@@ -70,7 +70,7 @@ SAMPLES = {
     "not": "not p", "xor": "xor(p, a < 0)", "if": "if p then a < 2 else a > 3",
     "abs": "abs(a) == 2", "min": "min(a, k) == 2", "max": "max(a, k) == 2", "mod": "mod(a, 3) == 2",
     "div": "div(a, 3) == -3", "sqrt": "sqrt(k + 1) == 2",
-    "sin": "sin(x) <= x", "cos": "cos(x) <= 1 - x * x / 2", "atan2": "atan2(x, k + 1) > 0.5",
+    "sin": "sin(x) <= x", "cos": "cos(x) >= 1 - x * x / 2 and x <= 1", "atan2": "atan2(x, k + 1) > 0.5",
 }  # fmt: skip
 """A formula with each operator of the table."""
 

@@ -223,8 +223,7 @@ def driver(system: System, name: str) -> Driver:
         refuse(source_faults(source, path))
     placed = plan.ros.names.placed(node.name)
     params, faults = parameters(root, source, placed.name)
-    if faults:
-        raise Rejected(*faults)
+    refuse(faults)
     known = require(definitions(plan.messages, plan.ros.distro))
     known = Definitions({HEADER: (_ROS1_HEADER if source.kind is Driving.ROSPY else _HEADER), **known.messages})
     folders = [folder for folder in path.parents if folder.is_relative_to(root)]
