@@ -17,7 +17,7 @@ from avow.base.python_names import imported, inherited, top_level, unbound
 from avow.base.suggestions import did_you_mean, suggest
 from avow.ros.definitions import Message
 from avow.ros.sources import definitions
-from avow.system.plan import Driving, NodePlan, Plan, Source
+from avow.system.plan import Driving, Plan, Source
 
 _GIVES: Mapping[str, tuple[int, str, tuple[str, ...], int]] = {
     "create_subscription": (2, "callback", ("message",), 1),  # and the message's info, in newer distributions
@@ -41,14 +41,12 @@ def misused(plan: Plan) -> Iterator[Diagnostic]:
     Python files that the plan names as sources. A file that is no Python is left to the methods."""
     messages = functools.cache(lambda: definitions(plan.messages, plan.ros.distro)[0].messages)  # read if a file asks
     for entry in plan.nodes:
-        path = inside(plan.root, entry.source.python) if entry.source and entry.source.python else None
-        if path is None:
+        if entry.source is None or not entry.source.python or (path := inside(plan.root, entry.source.python)) is None:
             continue
         with contextlib.suppress(OSError, SyntaxError, ValueError, RecursionError):
-            tree = ast.parse(read_regular(path))
+            tree = parsed(path)
             faults = [*_callbacks(tree, str(path)), *_imports(tree, str(path), messages)]
-            faults += source_faults(entry.source, path) if entry.source else ()
-            faults += _named(tree, plan, entry, str(path))
+            faults += [*source_faults(entry.source, tree), *_named(tree, plan, entry.node, entry.source, str(path))]
             yield from faults
             remedied = set(
                 re.findall(r"\w+", " ".join(re.findall("`([^`]*)`", " ".join(d.hint or "" for d in faults))))
@@ -63,31 +61,34 @@ def misused(plan: Plan) -> Iterator[Diagnostic]:
                 yield Diagnostic("DRIVE106", message, _span(name, str(path)), Severity.WARNING, hint)
 
 
-def _named(tree: ast.Module, plan: Plan, entry: NodePlan, file: str) -> Iterator[Diagnostic]:
+def parsed(path: Path) -> ast.Module:
+    """A Python file. Raises OSError, SyntaxError, ValueError and RecursionError."""
+    return ast.parse(read_regular(path))
+
+
+def _named(tree: ast.Module, plan: Plan, node: str, source: Source, file: str) -> Iterator[Diagnostic]:
     """A warning if a class of rclpy names its node otherwise than the plan, and no launch file can rename it: private
     topics and parameters have another name on the robot."""
-    if entry.source is None or entry.source.kind is not Driving.RCLPY or plan.launched is not None:
+    declared, placed = top_level(tree).get(source.class_name), plan.ros.names.placed(node).name
+    if source.kind is not Driving.RCLPY or plan.launched or not isinstance(declared, ast.ClassDef):
         return
-    placed = plan.ros.names.placed(entry.node).name
-    for declared in (d for d in tree.body if isinstance(d, ast.ClassDef) and d.name == entry.source.class_name):
-        for call in ast.walk(declared):
-            match call:
-                case ast.Call(
-                    func=ast.Attribute(value=ast.Call(func=ast.Name(id="super")), attr="__init__"),
-                    args=[ast.Constant(value=str(name)) as said, *_],
-                ) if name != placed.rpartition("/")[2]:
-                    message = f"the class names its node `{name}`, and in the plan it is {placed}"
-                    hint = f"write `ros: {{nodes: {{{entry.node}: {{name: {name}}}}}}}`, or name it alike"
-                    at = Span(file, said.lineno, said.col_offset + 1, said.lineno, (said.end_col_offset or 0) + 1)
-                    yield Diagnostic("DRIVE109", message, at, Severity.WARNING, hint)
-                case _:  # not the node's name
-                    pass
+    for call in ast.walk(declared):
+        match call:
+            case ast.Call(
+                func=ast.Attribute(value=ast.Call(func=ast.Name(id="super")), attr="__init__"),
+                args=[ast.Constant(value=str(name)) as said, *_],
+            ) if name != placed.rpartition("/")[2]:
+                message = f"the class names its node `{name}`, and in the plan it is {placed}"
+                hint = f"write `ros: {{nodes: {{{node}: {{name: {name}}}}}}}`, or name it alike"
+                at = Span(file, said.lineno, said.col_offset + 1, said.lineno, (said.end_col_offset or 0) + 1)
+                yield Diagnostic("DRIVE109", message, at, Severity.WARNING, hint)
+            case _:  # not the node's name
+                pass
 
 
-def source_faults(source: Source, path: Path) -> tuple[Diagnostic, ...]:
+def source_faults(source: Source, tree: ast.Module) -> tuple[Diagnostic, ...]:
     """What is wrong with the class that a plan declares, as far as its file's text shows: there is none of that name,
-    or it is of another kind. Raises OSError, SyntaxError, ValueError and RecursionError if the file cannot be read."""
-    tree = ast.parse(read_regular(path))
+    or it is of another kind."""
     defined = top_level(tree)
     declared = defined.get(source.class_name)
     if not isinstance(declared, ast.ClassDef):
@@ -109,14 +110,13 @@ def _imports(tree: ast.Module, file: str, messages: Callable[[], Mapping[str, Me
     for node, part in wanted:
         package, _, kind = (node.module or "").rpartition(".")
         names = (re.fullmatch(rf"{package}/([^_]*){_FIRST[f'.{kind}']}", name, re.ASCII) for name in known)
-        own = [name[1] for name in names if name]
-        calls = [f"{name}{part}" for name in own for part in ("Request", "Response") if kind == "srv"]  # of ROS 1
-        if kind == "msg":  # ROS 1 has messages for the parts of an action
-            parts = [
-                name.removeprefix(f"{package}/") for name in known if name.startswith(f"{package}/") and "_" in name
-            ]
-            own += [name.replace("_", "") for name in parts]
-            own += [f"{name.removesuffix('_Goal')}Action" for name in parts if name.endswith("_Goal")]
+        own, calls = [name[1] for name in names if name], list[str]()
+        if kind == "srv":  # ROS 1 has classes for the parts of a call
+            calls = [f"{name}{end}" for name in own for end in ("Request", "Response")]
+        elif kind == "msg":  # and messages for those of an action
+            ends = [name.partition("/")[2] for name in known if name.startswith(f"{package}/") and "_" in name]
+            own += [name.replace("_", "") for name in ends]
+            own += [f"{name.removesuffix('_Goal')}Action" for name in ends if name.endswith("_Goal")]
         if own and part.name not in (*own, *calls, "*"):
             at = Span(file, part.lineno, part.col_offset + 1, part.lineno, part.col_offset + 1 + len(part.name))
             message = f"there is no {kind.replace('msg', 'message')} {package}/{part.name}"

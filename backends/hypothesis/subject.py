@@ -77,7 +77,7 @@ def subject(job: Job) -> SubjectFile:
     defined = top_level(tree)
     if found.driven:
         assert job.source is not None
-        refuse(source_faults(job.source, found.path))
+        refuse(source_faults(job.source, tree))
         if job.source.kind is not Driving.STEP:
             return found
         declared = defined[job.source.class_name]

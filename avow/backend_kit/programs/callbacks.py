@@ -28,7 +28,7 @@ from avow.ros.bags import fields_of
 from avow.ros.calls import CALL, is_part
 from avow.ros.definitions import HEADER, INTEGERS, Array, Definitions, Field, Message, Nested, Scalar, Wire, canonical
 from avow.ros.sources import definitions, require
-from avow.system.driven import source_faults
+from avow.system.driven import parsed, source_faults
 from avow.system.node_plan import parameter_place, parameters
 from avow.system.plan import Driving, Source, System
 from avow.system.topics import whole_name
@@ -220,7 +220,7 @@ def driver(system: System, name: str) -> Driver:
     path = inside(root, source.python)
     assert path is not None  # or the plan would not load
     with contextlib.suppress(SyntaxError, ValueError, RecursionError):
-        refuse(source_faults(source, path))
+        refuse(source_faults(source, parsed(path)))
     placed = plan.ros.names.placed(node.name)
     params, faults = parameters(root, source, placed.name)
     refuse(faults)
