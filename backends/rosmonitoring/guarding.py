@@ -10,7 +10,7 @@ from typing import Any
 from avow.backend_kit.box import BOX, Box
 from avow.formulas.formula import conjunction
 from avow.language.contract import Clause, ClauseKind, Node
-from avow.ros.definitions import Definitions, Wire
+from avow.ros.definitions import FLOATS, INTEGERS, Definitions, Wire
 
 from .rules import Choice, Fields, Rule
 
@@ -20,17 +20,18 @@ FALLBACK = "/avow_fallback"
 Fallback = Mapping[str, bool | float | str]
 """Top-level fields of a message, and their values."""
 
-_KINDS = ("int8", "uint8", "int16", "uint16", "int32", "uint32", "int64", "uint64", "float32", "float64")
-_CODES = dict(zip(_KINDS, "bBhHiIqQfd", strict=True))
-
 
 def _fits(value: bool | float | str, wire: Wire) -> bool:
     """Whether a field of this type can have the value."""
+    name = str(wire)
     if isinstance(value, bool | str):
-        return str(wire) == ("bool" if isinstance(value, bool) else "string")
+        return name == ("bool" if isinstance(value, bool) else "string")
+    if name in INTEGERS:
+        least, greatest = INTEGERS[name]
+        return isinstance(value, int) and least <= value <= greatest
     try:
-        return bool(struct.pack(_CODES[str(wire)], value))
-    except (KeyError, struct.error, OverflowError):
+        return name in FLOATS and bool(struct.pack("f" if name == "float32" else "d", value))
+    except (struct.error, OverflowError):
         return False
 
 
