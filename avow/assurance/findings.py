@@ -67,7 +67,7 @@ def _match(
         now = mark(asked)
     if finding.verdict == Status.MISSING:
         rested = (h for entries in counting.values() for e in entries for h in e.evidence.rests_on)
-        now = next((h.digest[:12] for h in rested if h.name == finding.obligation), "")
+        now = next((text_mark(h) for h in rested if h.name == finding.obligation), "")
     now = now if now != finding.found else ""
     if now and finding.found:
         alike = []
@@ -116,10 +116,15 @@ def takes(pattern: str, matched: Sequence[str], name: str) -> bool:
     return _matches(pattern, name) and (not is_wild(pattern) or name in matched)
 
 
+def text_mark(hypothesis: Hypothesis) -> str:
+    """The mark (``found``) of what a method supposes: a digest of its text."""
+    return hypothesis.digest[:12]
+
+
 def accepts(name: str, found: str, hypothesis: Hypothesis) -> bool:
     """Whether an entry of that name, marked with `found`, accepts what a method supposes: an edit of the text that says
     it (a box, initial values) ends the acceptance."""
-    return name == hypothesis.name and found == hypothesis.digest[:12]
+    return name == hypothesis.name and found == text_mark(hypothesis)
 
 
 def _matches(pattern: str, name: str) -> bool:

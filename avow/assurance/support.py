@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence, Set
 
 from avow.assurance.facts import Facts
-from avow.assurance.findings import accepts
+from avow.assurance.findings import accepts, text_mark
 from avow.assurance.model import Derivation, Handled, NodeView
 from avow.assurance.naming import derivation_claim, is_advice, is_foundation, requirement_claim, sanity_property
 from avow.base.remembered import by_identity
@@ -103,7 +103,7 @@ def _belongs(obligation: str, requirement: str) -> bool:
 
 def assumption_claim(hypothesis: Hypothesis) -> str:
     """One claim for each assumption, whatever rests on it."""
-    return f"assumption:{hypothesis.name}:{hypothesis.digest[:12]}"
+    return f"assumption:{hypothesis.name}:{text_mark(hypothesis)}"
 
 
 def assumption_claims(hypotheses: Iterable[Hypothesis], accepted: Iterable[Handled]) -> Iterable[Claim]:

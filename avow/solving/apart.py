@@ -160,6 +160,9 @@ def versions() -> dict[str, str]:
 _PRODUCT = re.compile(r"\(\* (?!\(?[-/]? ?\d)(?!\S+ \(?[-/]? ?\d)")
 """A product of factors that are not literals."""
 
+_ROOT = re.compile("(sqrt|sin|cos|atan2)!")
+"""The constant for a root, a sine, a cosine or an angle."""
+
 
 def _ask_cvc5(script: str, limit: int) -> tuple[str, int]:
     """``sat``, ``unsat`` or ``unknown``, empty if cvc5 cannot read the script; and the number of its own steps that it
@@ -170,9 +173,7 @@ def _ask_cvc5(script: str, limit: int) -> tuple[str, int]:
     solver = cvc5.Solver(terms)
     solver.setOption("rlimit-per", str(limit))
     solver.setOption("full-saturate-quant", "true")
-    if re.search(
-        "(sqrt|sin|cos|atan2)!", script
-    ):  # without, it looks for an irrational number for ever, and counts no steps
+    if _ROOT.search(script):  # without, it looks for an irrational number for ever, and counts no steps
         solver.setOption("nl-cov", "true")
     if _PRODUCT.search(script) and re.search(r"\((forall|exists) ", script):
         solver.setOption("cegqi", "false")  # it never ends there, and counts no steps (seen: ``exists x. x * x == y``)
