@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import subprocess
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +22,11 @@ from .test_pace import MAPPING, RCL
 
 def monitor(*arguments: str, stdin: str = "") -> subprocess.CompletedProcess[str]:
     return avow("monitor", *arguments, cwd=Path.cwd(), stdin=stdin)
+
+
+def heard(folder: Path, events: Iterable[Mapping[str, Any]]) -> subprocess.CompletedProcess[str]:
+    """What the monitors of a system's folder say of events on standard input."""
+    return monitor(str(folder), "-", stdin="".join(f"{json.dumps(event)}\n" for event in events))
 
 
 @pytest.fixture(scope="module")
@@ -199,7 +204,7 @@ def test_inputs_that_are_too_old_are_no_success(tmp_path: Path) -> None:
     (tmp_path / "plan.yaml").write_text(f"ros: {{distro: humble}}\nnodes: {{n: {{methods: [{method}]}}}}\n")
     for late, code in ((5.0, 1), (0.4, 0)):
         events = [{"topic": "x", "time": 1.0, "data": 9.0}, {"topic": "y", "time": 1.0 + late, "data": True}]
-        done = monitor(str(tmp_path), "-", stdin="".join(f"{json.dumps(event)}\n" for event in events))
+        done = heard(tmp_path, events)
         assert (done.returncode, "too old (`max_age`)" in done.stdout) == (code, code == 1), done.stdout
 
 
@@ -210,7 +215,7 @@ def test_the_remedy_of_a_clause_is_said_with_its_first_breach(tmp_path: Path) ->
     )
     (tmp_path / "plan.yaml").write_text("ros: {distro: humble}\nnodes: {n: {methods: [{rosmonitoring: {}}]}}\n")
     events = [{"topic": "y", "time": time, "data": 0.2} for time in (1.0, 2.0, 3.0)]
-    done = monitor(str(tmp_path), "-", stdin="".join(f"{json.dumps(event)}\n" for event in events))
+    done = heard(tmp_path, events)
     assert done.stdout.count("exactly, out.y is 0.2 + 1.1e-17, since no float is the decimal number") >= 3
     assert done.stdout.count("guarantee broken") >= 3
     assert done.stdout.partition("event 2")[2].count("event 3") == 1
@@ -225,7 +230,7 @@ def test_one_remedy_for_several_clauses_is_said_once(tmp_path: Path) -> None:
     )
     (tmp_path / "plan.yaml").write_text("ros: {distro: humble}\nnodes: {n: {methods: [{rosmonitoring: {}}]}}\n")
     events = [{"topic": "x", "time": 1.0, "data": 9.0}, {"topic": "y", "time": 1.1, "data": True}]
-    done = monitor(str(tmp_path), "-", stdin="".join(f"{json.dumps(event)}\n" for event in events))
+    done = heard(tmp_path, events)
     assert "unmonitored: n.g, n.h\n  n.g, n.h: the plan does not say which input" in done.stdout
     assert done.stdout.count("add `answers:") == 1
 
@@ -248,6 +253,6 @@ def test_without_answers_what_held_is_no_evidence_and_no_success(tmp_path: Path)
     )
     (tmp_path / "plan.yaml").write_text("ros: {distro: humble}\nnodes: {n: {methods: [{rosmonitoring: {}}]}}\n")
     events = [{"topic": "x", "time": 1.0, "data": 9.0}, {"topic": "y", "time": 1.1, "data": True}]
-    done = monitor(str(tmp_path), "-", stdin="".join(f"{json.dumps(event)}\n" for event in events))
+    done = heard(tmp_path, events)
     assert (done.returncode, "unmonitored: n.g\n" in done.stdout) == (1, True)
     assert "  n.g: the plan does not say which input an answer answered: add `answers: {latency: 10 ms, " in done.stdout
